@@ -1,0 +1,75 @@
+"""Errors: one class per thing the user can do about it; every message says what, where, what is allowed, what to do."""
+
+import difflib
+import functools
+import inspect
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class OptsatError(Exception):
+    """Base of every error that optsat raises on purpose."""
+
+
+class InputError(OptsatError, ValueError):
+    """An argument is wrong; the message names it."""
+
+
+class UnknownOptionError(OptsatError, TypeError):
+    """An option has a name that the call does not know; the message offers the nearest one."""
+
+
+class InfeasibleBoxError(InputError):
+    """A component box does not touch the unit sphere, so it cannot hold a direction."""
+
+
+class RecordError(OptsatError, ValueError):
+    """A measurement log is wrong at a file, line and column."""
+
+    def __init__(self, message: str, *, file: str, line: int | None = None, column: str | None = None) -> None:
+        where = file + (f", line {line}" if line is not None else "") + (f", column {column}" if column else "")
+        super().__init__(f"{where}: {message}")
+        self.file, self.line, self.column = file, line, column
+
+
+class UnsupportedFormError(OptsatError, TypeError):
+    """A solver was asked for a form that it cannot solve."""
+
+
+class NotProvenError(OptsatError):
+    """A solution does not carry the proof that was required; the answer is kept in `.solution`."""
+
+    def __init__(self, message: str, solution: object) -> None:
+        super().__init__(message)
+        self.solution = solution
+
+
+class CertificateFormatError(OptsatError, ValueError):
+    """A certificate file cannot be read as one of the known formats."""
+
+
+class MissingExtraError(OptsatError, ImportError):
+    """An optional dependency is absent; the message names the extra that brings it."""
+
+
+def nearest_name(name: str, known: list[str]) -> str:
+    """Return ' Did you mean `x`?' for the nearest known name, or the list of known names."""
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f" Did you mean `{near[0]}`?" if near else f" Known: {', '.join(known)}."
+
+
+def explain_unknown_options(function: Callable[P, R]) -> Callable[P, R]:
+    """Decorate a public function so that a misspelt keyword names the nearest option instead of a bare TypeError."""
+    known = list(inspect.signature(function).parameters)
+
+    @functools.wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name in kwargs:
+            if name not in known:
+                raise UnknownOptionError(f"{function.__name__} has no option `{name}`.{nearest_name(name, known)}")
+        return function(*args, **kwargs)
+
+    return checked

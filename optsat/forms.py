@@ -1,0 +1,64 @@
+"""Forms: the few standard shapes that problems lower themselves to and solvers accept."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from optsat.arrays import Array
+from optsat.attitude.admissible_set import AdmissibleSet
+from optsat.solution import Termination
+
+
+@dataclass(frozen=True)
+class Point:
+    """What a solver returns: a primal point, multipliers, why it stopped.
+
+    x : primal point in the form's own coordinates
+    dual : multipliers in the form's own order, empty where the form has none
+    """
+
+    x: Array
+    dual: Array
+    termination: Termination
+    iterations: int = 0
+    stats: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class AlignmentForm:
+    """Minimise 1/2 sum a_i |b_i - A r_i|^2 over rotations A; `x` is q_BN, scalar last.
+
+    b_B, r_N : (m, 3) unit rows; weights : (m,) >= 0, sum 1
+    """
+
+    b_B: Array
+    r_N: Array
+    weights: Array
+
+
+@dataclass(frozen=True)
+class EnclosureForm:
+    """Find the smallest ball of attitudes that holds an admissible set.
+
+    `x` is the centre q_BN, `dual` the weights of the constraints that prove the ball (Theorem 1), scaled to sum 1.
+    """
+
+    admissible: AdmissibleSet
+
+
+ConeKind = Literal["zero", "nonnegative", "second_order", "psd_triangle"]
+
+
+@dataclass(frozen=True)
+class ConicForm:
+    """Minimise q.x subject to A x + s = b, s in a product of cones; `dual` are the multipliers of the rows.
+
+    A : (rows, n) dense; b : (rows,); q : (n,)
+    cones : (kind, size) in row order; for "psd_triangle" size is the matrix order k and the k (k + 1) / 2 rows hold the
+    upper triangle by columns, off-diagonal entries scaled by sqrt 2
+    """
+
+    q: Array
+    A: Array
+    b: Array
+    cones: tuple[tuple[ConeKind, int], ...]

@@ -1,0 +1,109 @@
+"""Two vectors in closed form: the Wahba attitude, and the weights that give the smallest guaranteed bound.
+
+All functions take (..., 2, 3) unit vectors and work on whole arrays at once.
+"""
+
+import numpy as np
+
+from optsat.arrays import Array
+
+_GOLDEN = (np.sqrt(5.0) - 1) / 2
+_STEPS = 24
+_LOG_RATIO_LIMIT = 40.0
+
+
+def pair_angle(unit: Array) -> Array:
+    """Return the angle (...) [rad] between the two unit rows of (..., 2, 3), accurate from 0 to pi."""
+    total = np.linalg.norm(unit[..., 0, :] + unit[..., 1, :], axis=-1)
+    difference = np.linalg.norm(unit[..., 0, :] - unit[..., 1, :], axis=-1)
+    return np.asarray(2 * np.arctan2(difference, total))
+
+
+def wahba_dcm(b_B: Array, r_N: Array, weights: Array) -> Array:
+    """Return the rotation A (..., 3, 3) that minimises the weighted Wahba loss of two non-collinear pairs.
+
+    A = b3 r3^T + (w/p) [b1 r1^T + (b1 x b3)(r1 x r3)^T] + (v/p) [b2 r2^T + (b2 x b3)(r2 x r3)^T],
+    p = sqrt(w^2 + v^2 + 2 w v cos(theta_b - theta_r)).
+
+    weights : (..., 2), sum 1. Collinear pairs give NaN: the caller decides before.
+    Source: robust attitude paper, two-vector form; Markley (2002), fast attitude from two vectors.
+    """
+    b3 = np.cross(b_B[..., 0, :], b_B[..., 1, :])
+    r3 = np.cross(r_N[..., 0, :], r_N[..., 1, :])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        b3 = b3 / np.linalg.norm(b3, axis=-1, keepdims=True)
+        r3 = r3 / np.linalg.norm(r3, axis=-1, keepdims=True)
+        w, v = weights[..., 0], weights[..., 1]
+        p = np.sqrt(w * w + v * v + 2 * w * v * np.cos(pair_angle(b_B) - pair_angle(r_N)))
+        A = b3[..., :, None] * r3[..., None, :]
+        for k, share in ((0, w / p), (1, v / p)):
+            b, r = b_B[..., k, :], r_N[..., k, :]
+            plane = b[..., :, None] * r[..., None, :] + np.cross(b, b3)[..., :, None] * np.cross(r, r3)[..., None, :]
+            A = A + share[..., None, None] * plane
+    return np.asarray(A)
+
+
+def quaternion_from_dcm(dcm: Array) -> Array:
+    """Return the unit quaternion (..., 4) nearest to rotation matrices (..., 3, 3), by the largest column of 4 q q^T."""
+    t = np.trace(dcm, axis1=-2, axis2=-1)
+    outer = np.empty((*dcm.shape[:-2], 4, 4))
+    outer[..., :3, :3] = dcm + np.swapaxes(dcm, -1, -2)
+    for k in range(3):
+        outer[..., k, k] = 1 + 2 * dcm[..., k, k] - t
+    vector = np.stack(
+        (dcm[..., 1, 2] - dcm[..., 2, 1], dcm[..., 2, 0] - dcm[..., 0, 2], dcm[..., 0, 1] - dcm[..., 1, 0]), axis=-1
+    )
+    outer[..., :3, 3] = vector
+    outer[..., 3, :3] = vector
+    outer[..., 3, 3] = 1 + t
+    largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
+    column = np.take_along_axis(outer, largest[..., None, None], axis=-1)[..., 0]
+    return np.asarray(column / np.linalg.norm(column, axis=-1, keepdims=True))
+
+
+def squared_sine_bound(x: Array, versine: Array, theta_b: Array, theta_r: Array) -> Array:
+    """Return rho(x) = sin^2(bound / 2) (...) at the log weight ratio x = log(w / v), without cancellation.
+
+    versine : (..., 2) 1 - cos(eps). Source: Theorem 1 for N = 2, robust Wahba specification section 6.
+    """
+    w, v = 1 / (1 + np.exp(-x)), 1 / (1 + np.exp(x))
+    difference, total = theta_b - theta_r, theta_b + theta_r
+    p = np.sqrt(w * w + v * v + 2 * w * v * np.cos(difference))
+    m = np.sqrt(w * w + v * v + 2 * w * v * np.cos(total))
+    numerator = versine[..., 0] / v + versine[..., 1] / w - 4 * np.sin(difference / 2) ** 2 / (p + 1)
+    return np.asarray(numerator * (p + m) / (4 * np.sin(theta_b) * np.sin(theta_r)))
+
+
+def best_weights(b_B: Array, r_N: Array, angle_bound_rad: Array) -> Array:
+    """Return the weights (..., 2), sum 1, that minimise the guaranteed bound of two pairs.
+
+    Golden section on x = log(w / v) in the exact bracket between 0 and log(sin(eps_2 / 2) / sin(eps_1 / 2)).
+    angle_bound_rad : (..., 2)
+    """
+    half = np.sin(angle_bound_rad / 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        end = np.log(half[..., 1]) - np.log(half[..., 0])
+    end = np.clip(np.nan_to_num(end, nan=0.0, posinf=_LOG_RATIO_LIMIT, neginf=-_LOG_RATIO_LIMIT), -_LOG_RATIO_LIMIT, _LOG_RATIO_LIMIT)
+    theta_b, theta_r = pair_angle(b_B), pair_angle(r_N)
+    versine = 2 * half**2
+    low, high = np.minimum(end, 0.0), np.maximum(end, 0.0)
+    x1, x2 = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        f1, f2 = (squared_sine_bound(x, versine, theta_b, theta_r) for x in (x1, x2))
+        for _ in range(_STEPS):
+            left = f1 <= f2
+            high, low = np.where(left, x2, high), np.where(left, low, x1)
+            probe = np.where(left, high - _GOLDEN * (high - low), low + _GOLDEN * (high - low))
+            value = squared_sine_bound(probe, versine, theta_b, theta_r)
+            x1, x2 = np.where(left, probe, x2), np.where(left, x1, probe)
+            f1, f2 = np.where(left, value, f2), np.where(left, f1, value)
+    x = np.where(f1 <= f2, x1, x2)
+    return np.stack((1 / (1 + np.exp(-x)), 1 / (1 + np.exp(x))), axis=-1)
+
+
+def collinear(b_B: Array, r_N: Array, tolerance: float = 1e-12) -> Array:
+    """Return whether either pair of directions (..., 2, 3) spans no plane: sine of its angle <= tolerance."""
+    return np.asarray(
+        (np.linalg.norm(np.cross(b_B[..., 0, :], b_B[..., 1, :]), axis=-1) <= tolerance)
+        | (np.linalg.norm(np.cross(r_N[..., 0, :], r_N[..., 1, :]), axis=-1) <= tolerance)
+    )

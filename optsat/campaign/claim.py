@@ -1,0 +1,69 @@
+"""Claim: one sentence with a figure, the figure measured here, and the verdict."""
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+
+class Verdict(enum.Enum):
+    """What a study found about a claim.
+
+    The first three judge a figure that a paper printed, the last two a bar that we set ourselves. Only FAILS
+    makes a study end with exit code 1: a paper's figure that cannot be reproduced is an honest finding.
+    """
+
+    REPRODUCED = "REPRODUCED"
+    NOT_REPRODUCED = "NOT_REPRODUCED"
+    BEATEN = "BEATEN"
+    HOLDS = "HOLDS"
+    FAILS = "FAILS"
+
+
+Figure = float | str
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim and what became of it.
+
+    id : short name, unique within the study
+    says : the claim as a sentence, with the unit of its figure
+    paper : the printed figure, or None where the bar is our own
+    measured : the figure of this run; a word where the claim is not a number
+    """
+
+    id: str
+    says: str
+    paper: Figure | None
+    measured: Figure
+    verdict: Verdict
+
+
+def judge_paper(
+    id: str,
+    says: str,
+    *,
+    paper: float,
+    measured: float,
+    tolerance: float,
+    better: Literal["lower", "higher"] | None = None,
+) -> Claim:
+    """Return the claim about a printed figure, judged by an absolute tolerance in the figure's own unit.
+
+    REPRODUCED within `tolerance` of the paper; BEATEN further away on the `better` side; else NOT_REPRODUCED.
+    A figure that is not finite is never reproduced.
+    """
+    gain = {"lower": paper - measured, "higher": measured - paper, None: -math.inf}[better]
+    if abs(measured - paper) <= tolerance:
+        verdict = Verdict.REPRODUCED
+    elif gain > tolerance and math.isfinite(measured):
+        verdict = Verdict.BEATEN
+    else:
+        verdict = Verdict.NOT_REPRODUCED
+    return Claim(id, says, paper, measured, verdict)
+
+
+def judge_bar(id: str, says: str, *, measured: Figure, holds: bool) -> Claim:
+    """Return the claim about a bar of our own: HOLDS or FAILS."""
+    return Claim(id, says, None, measured, Verdict.HOLDS if holds else Verdict.FAILS)

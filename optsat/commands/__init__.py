@@ -1,0 +1,1 @@
+"""Commands: one file a command, thin: parse, call, print; whatever is slow to import is imported inside."""

@@ -1,0 +1,95 @@
+"""`optsat study`: list the studies, run one."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from optsat.commands.output import AsJson, aligned, note, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from optsat.campaign.result import StudyResult
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Studies: one table, figure or comparison each, with its claims.",
+)
+
+
+@app.command("list", epilog="Example: optsat study list --json")
+def list_command(as_json: AsJson = False) -> None:
+    """List the studies with one line each."""
+    from optsat.campaign.catalogue import list_studies
+
+    studies = list_studies()
+    if as_json:
+        print_json([{"study": name, "says": says} for name, says in studies.items()])
+    else:
+        typer.echo(aligned(list(studies.items())))
+
+
+@app.command("run", epilog="Example: optsat study run NAME --cases 100 --workers 2 --out results")
+def run_command(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A name of `optsat study list`.", show_default=False)],
+    cases: Annotated[int | None, typer.Option(min=1, help="Number of cases; the study's own when absent.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the campaign.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Worker processes; the rows are the same for any number.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for result.json, rows.csv and the figure.", show_default=False),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a study and judge its claims. Exit code 1 when a case failed or a bar of our own fails."""
+    import sys
+
+    from optsat.campaign.catalogue import load_study
+    from optsat.campaign.runner import run_study
+    from optsat.campaign.store import write_result
+
+    study = load_study(name)
+    if out is not None:
+        # a folder that cannot be made must be known before the first case, not after the last
+        out.mkdir(parents=True, exist_ok=True)
+    with progress_bar(study.name) as report:
+        result = run_study(study, cases, seed, workers, report)
+    if out is not None:
+        write_result(result, out, sys.argv)
+        if study.figure is not None and result.rows:
+            study.figure(result.rows, out / "figure.svg")
+        note(f"Written to {out}.")
+    if as_json:
+        print_json(result.summary())
+    else:
+        typer.echo(f"{study.title}\n{_in_words(result)}")
+    if not result.passed:
+        raise typer.Exit(1)
+
+
+def _in_words(result: "StudyResult") -> str:
+    parts = [f"{result.study}, version {result.version}: {result.cases} cases, seed {result.seed}"]
+    if result.metrics:
+        parts.append(aligned([(f"  {name}", f"{value:.6g}") for name, value in result.metrics.items()]))
+    if result.claims:
+        parts.append(
+            aligned(
+                [
+                    (
+                        f"  {claim.verdict.value}",
+                        f"measured {_figure(claim.measured)}",
+                        f"paper {_figure(claim.paper)}" if claim.paper is not None else "",
+                        f"{claim.id}: {claim.says}",
+                    )
+                    for claim in result.claims
+                ]
+            )
+        )
+    if result.failures:
+        first = result.failures[0]
+        parts.append(f"{len(result.failures)} cases failed, first case {first.case}: {first.error}: {first.message}")
+    return "\n".join(parts)
+
+
+def _figure(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"

@@ -1,0 +1,42 @@
+"""Options, profiles and fixtures shared by all tests."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("optsat", deadline=None, print_blob=True)
+settings.load_profile("optsat")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--run-benchmarks", action="store_true", help="also run the tests marked `benchmark`")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--run-benchmarks"):
+        return
+    skip = pytest.mark.skip(reason="a benchmark; run it with --run-benchmarks")
+    for item in items:
+        if item.get_closest_marker("benchmark"):
+            item.add_marker(skip)
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The folder that holds pyproject.toml."""
+    return Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def shared_data(root: Path) -> Callable[[str], Path]:
+    """Return a lookup of data kept beside the checkout, which skips the test where the data is absent."""
+
+    def lookup(name: str) -> Path:
+        path = root.parent / "shared" / "data" / name
+        if not path.exists():
+            pytest.skip(f"../shared/data/{name} is not beside this checkout")
+        return path
+
+    return lookup

@@ -1,0 +1,34 @@
+"""Verdicts: what is reproduced, beaten, not reproduced."""
+
+import math
+from typing import Literal
+
+import pytest
+
+from optsat.campaign.claim import Verdict, judge_bar, judge_paper
+
+
+@pytest.mark.parametrize(
+    ("measured", "better", "verdict"),
+    [
+        (1.0, None, Verdict.REPRODUCED),
+        (1.125, "lower", Verdict.REPRODUCED),
+        (0.5, "lower", Verdict.BEATEN),
+        (0.5, "higher", Verdict.NOT_REPRODUCED),
+        (1.5, "higher", Verdict.BEATEN),
+        (0.5, None, Verdict.NOT_REPRODUCED),
+        (math.nan, "lower", Verdict.NOT_REPRODUCED),
+        (-math.inf, "lower", Verdict.NOT_REPRODUCED),
+        (math.inf, "higher", Verdict.NOT_REPRODUCED),
+    ],
+)
+def test_a_printed_figure(measured: float, better: Literal["lower", "higher"] | None, verdict: Verdict) -> None:
+    claim = judge_paper("id", "says", paper=1.0, measured=measured, tolerance=0.125, better=better)
+    assert claim.verdict is verdict
+    assert claim.paper == 1.0
+
+
+def test_a_bar_of_our_own_has_no_paper() -> None:
+    claim = judge_bar("id", "says", measured="all", holds=True)
+    assert (claim.paper, claim.verdict) == (None, Verdict.HOLDS)
+    assert judge_bar("id", "says", measured=2.0, holds=False).verdict is Verdict.FAILS

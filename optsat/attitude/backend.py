@@ -38,13 +38,13 @@ def stack(parts: Iterable[Value]) -> Value:
 
 def matrix(rows: Iterable[Iterable[Value]]) -> Value:
     """Return rows of scalars as matrices (..., n, m), or as a CasADi matrix."""
-    rows = tuple(tuple(row) for row in rows)
-    flat = tuple(entry for row in rows for entry in row)
+    grid = tuple(tuple(row) for row in rows)
+    flat = tuple(entry for row in grid for entry in row)
     if is_symbolic(*flat):
         ca = _casadi()
-        return ca.vertcat(*(ca.horzcat(*row) for row in rows))
+        return ca.vertcat(*(ca.horzcat(*row) for row in grid))
     stacked = np.stack(np.broadcast_arrays(*flat), axis=-1)
-    return stacked.reshape(*stacked.shape[:-1], len(rows), len(rows[0]))
+    return stacked.reshape(*stacked.shape[:-1], len(grid), len(grid[0]))
 
 
 def join(*vectors: Value) -> Value:

@@ -11,7 +11,9 @@ Array = NDArray[np.float64]
 NormPolicy = Literal["warn", "error", "silent"]
 
 
-def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = None, unit: str = "-") -> Array:
+def finite_array(
+    name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = None, unit: str = "-"
+) -> Array:
     """Return `value` as a float64 array of the given shape (None = any length), all entries finite.
 
     Raises
@@ -20,11 +22,15 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
     """
     if np.ma.isMaskedArray(value) and np.ma.getmaskarray(value).any():  # type: ignore[no-untyped-call]
         first = tuple(int(i) for i in np.argwhere(np.ma.getmaskarray(value))[0])  # type: ignore[no-untyped-call]
-        raise InputError(f"`{name}` has a masked entry at index {first}. Drop the row or fill it; a mask is not a number.")
+        raise InputError(
+            f"`{name}` has a masked entry at index {first}. Drop the row or fill it; a mask is not a number."
+        )
     try:
         raw = np.asarray(value)
     except ValueError:
-        raise InputError(f"`{name}` must be a rectangular array of numbers [{unit}]; its rows differ in length.") from None
+        raise InputError(
+            f"`{name}` must be a rectangular array of numbers [{unit}]; its rows differ in length."
+        ) from None
     if np.iscomplexobj(raw):
         raise InputError(f"`{name}` must be real [{unit}], got complex numbers.")
     if raw.dtype == bool or raw.dtype.kind in "SUMm":
@@ -56,10 +62,17 @@ def _first_text(raw: NDArray[Any]) -> str:
 
 
 def _check_shape(name: str, array: Array, shape: tuple[int | None, ...], unit: str) -> None:
-    fits = array.ndim == len(shape) and all(want is None or want == got for want, got in zip(shape, array.shape, strict=True))
+    fits = array.ndim == len(shape) and all(
+        want is None or want == got for want, got in zip(shape, array.shape, strict=True)
+    )
     if fits:
         return
-    expected = "(" + ", ".join("m" if want is None else str(want) for want in shape) + ("," if len(shape) == 1 else "") + ")"
+    expected = (
+        "("
+        + ", ".join("m" if want is None else str(want) for want in shape)
+        + ("," if len(shape) == 1 else "")
+        + ")"
+    )
     hint = ""
     if array.ndim == 2 and len(shape) == 2 and shape[1] == array.shape[0] and shape[1] != array.shape[1]:
         hint = " Did you pass columns? Use `.T`."
@@ -116,7 +129,9 @@ def normalise_rows(name: str, array: Array, norm_policy: NormPolicy = "silent") 
     largest = np.max(np.abs(array), axis=-1, keepdims=True)
     if not np.all(largest > 0.0):
         index = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
-        raise InputError(f"`{name}` row {index[0] if len(index) == 1 else index} is the zero vector, which has no direction.")
+        raise InputError(
+            f"`{name}` row {index[0] if len(index) == 1 else index} is the zero vector, which has no direction."
+        )
     scaled = array / largest
     length = np.sqrt(np.sum(scaled * scaled, axis=-1, keepdims=True))
     if norm_policy != "silent":
@@ -126,7 +141,9 @@ def normalise_rows(name: str, array: Array, norm_policy: NormPolicy = "silent") 
         worst, norm = float(deviation[index]), float((length * largest)[..., 0][index])
         where = int(index[0]) if len(index) == 1 else tuple(int(i) for i in index)
         if norm_policy == "error" and worst > 1e-3:
-            raise InputError(f"`{name}` must hold unit vectors; row {where} has norm {norm:.6g}. Normalise it or use norm_policy='warn'.")
+            raise InputError(
+                f"`{name}` must hold unit vectors; row {where} has norm {norm:.6g}. Normalise it or use norm_policy='warn'."
+            )
         if norm_policy == "warn" and worst > 0.05:
             import warnings
 
@@ -148,7 +165,9 @@ def angle_bounds(name: str, value: ArrayLike, count: int) -> Array:
     if array.ndim == 0:
         array = np.full(count, float(array))
     if array.shape != (count,):
-        raise InputError(f"`{name}` must hold one bound per vector pair: shape ({count},) [rad], got {array.shape}.")
+        raise InputError(
+            f"`{name}` must hold one bound per vector pair: shape ({count},) [rad], got {array.shape}."
+        )
     if np.any(array < 0.0):
         index = int(np.argmax(array < 0.0))
         raise InputError(f"`{name}` must be >= 0 [rad]: index {index} is {array[index]:g}.")
@@ -171,10 +190,14 @@ def pair_weights(name: str, value: ArrayLike | None, count: int) -> Array:
         return np.full(count, 1.0 / count)
     array = finite_array(name, value)
     if array.shape != (count,):
-        raise InputError(f"`{name}` must hold one weight per vector pair: shape ({count},), got {array.shape}.")
+        raise InputError(
+            f"`{name}` must hold one weight per vector pair: shape ({count},), got {array.shape}."
+        )
     if np.any(array < 0.0):
         index = int(np.argmax(array < 0.0))
-        raise InputError(f"`{name}` must be >= 0: index {index} is {array[index]:g}. Drop a pair by weight 0.")
+        raise InputError(
+            f"`{name}` must be >= 0: index {index} is {array[index]:g}. Drop a pair by weight 0."
+        )
     largest = float(array.max())
     if largest == 0.0:
         raise InputError(f"`{name}` are all zero; at least one must be positive.")
@@ -192,5 +215,7 @@ def unit_quaternion(name: str, value: ArrayLike, tolerance: float = 1e-6) -> Arr
     q = finite_array(name, value, (4,))
     norm = float(np.linalg.norm(q))
     if abs(norm - 1.0) > tolerance:
-        raise InputError(f"`{name}` must be a unit quaternion (scalar last): norm was {norm:.6g}. Divide by the norm if that is meant.")
+        raise InputError(
+            f"`{name}` must be a unit quaternion (scalar last): norm was {norm:.6g}. Divide by the norm if that is meant."
+        )
     return np.asarray(q / norm)

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+
 from optsat.arrays import Array
 from optsat.attitude.admissible_set import AdmissibleSet
 from optsat.solution import Termination
@@ -62,3 +64,25 @@ class ConicForm:
     A: Array
     b: Array
     cones: tuple[tuple[ConeKind, int], ...]
+
+
+def symmetric_vector(matrices: Array) -> Array:
+    """Return the "psd_triangle" rows (..., k (k + 1) / 2) of symmetric matrices (..., k, k)."""
+    k = matrices.shape[-1]
+    rows, columns = zip(*((i, j) for j in range(k) for i in range(j + 1)), strict=True)
+    factor = np.where(np.array(rows) == np.array(columns), 1.0, np.sqrt(2.0))
+    return np.asarray(matrices[..., rows, columns] * factor)
+
+
+@dataclass(frozen=True)
+class CoverForm:
+    """Tighten a proven ball of attitudes by covering it with cells.
+
+    admissible : the set; q_BN, weights : centre and multipliers of the proven ball; scale : tan(theta / 2) of its radius, finite
+    What the cells are is the solver's own matter and travels in the point's `stats`.
+    """
+
+    admissible: AdmissibleSet
+    q_BN: Array
+    weights: Array
+    scale: float

@@ -3,4 +3,25 @@
 if __name__ != "optsat.solvers":
     raise ImportError(f"import optsat.solvers, not {__name__}")
 
-SOLVERS = ()
+from optsat.solve import Solver
+from optsat.solvers.cell_cover import CellCoverSolver
+from optsat.solvers.clarabel import Clarabel
+from optsat.solvers.davenport import Davenport
+from optsat.solvers.scaled_semidefinite import ScaledSemidefinite
+from optsat.solvers.subpaving import SubpavingSolver
+from optsat.solvers.svd import SingularValues
+from optsat.solvers.two_vector import Triad, TwoVector
+from optsat.solvers.two_vector_enclosure import TwoVectorEnclosure
+
+# the order is the preference: `solve` takes the first that accepts the form
+SOLVERS: tuple[Solver, ...] = (
+    Davenport(),
+    SingularValues(),
+    TwoVector(),
+    Triad(),
+    TwoVectorEnclosure(),
+    ScaledSemidefinite(),
+    CellCoverSolver(),
+    SubpavingSolver(),
+    Clarabel(),
+)

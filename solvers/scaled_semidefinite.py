@@ -13,7 +13,7 @@ from optsat.arrays import Array
 from optsat.attitude.admissible_set import AdmissibleSet
 from optsat.attitude.davenport import davenport_matrix, dominant_quaternion, turn
 from optsat.attitude.gibbs_chart import GibbsChart
-from optsat.forms import ConeKind, ConicForm, EnclosureForm, Point
+from optsat.forms import ConeKind, ConicForm, EnclosureForm, Point, symmetric_vector
 from optsat.solution import Termination
 from optsat.solvers.clarabel import Clarabel
 
@@ -97,7 +97,9 @@ def _active(chart: GibbsChart) -> Array:
     # a constraint that holds on the whole unit ball can only have multiplier 0
     if chart.scale >= _LARGEST_SCALE or len(chart.a) <= 8:
         return np.ones(len(chart.a), dtype=bool)
-    lowest = chart.a - 2 * np.linalg.norm(chart.h, axis=1) + np.minimum(np.linalg.eigvalsh(chart.G)[:, 0], 0.0)
+    lowest = (
+        chart.a - 2 * np.linalg.norm(chart.h, axis=1) + np.minimum(np.linalg.eigvalsh(chart.G)[:, 0], 0.0)
+    )
     return np.asarray(lowest <= 0.0)
 
 
@@ -119,7 +121,11 @@ def _programme(a: Array, h: Array, G: Array, s2: float) -> ConicForm:
     A[count:] = -(linear + s2 * quadratic)
     q = np.zeros(10)
     q[9] = -1.0
-    cones: tuple[tuple[ConeKind, int], ...] = (("nonnegative", count), ("psd_triangle", 4), ("psd_triangle", 4))
+    cones: tuple[tuple[ConeKind, int], ...] = (
+        ("nonnegative", count),
+        ("psd_triangle", 4),
+        ("psd_triangle", 4),
+    )
     return ConicForm(q, A, np.concatenate((a, constant)), cones)
 
 
@@ -132,18 +138,16 @@ def _semidefinite_rows() -> tuple[Array, Array, Array]:
     entries = [_unit(i + 1, j + 1) for i, j in _UPPER]
     sides = [_unit(0, k) for k in (1, 2, 3)]
     first = (_unit(0, 0), [*entries, *sides, zero], [*(-t for t in trace), zero, zero, zero, zero])
-    second = (lower, [*trace, *(-side for side in sides), -_unit(0, 0)], [*(-e for e in entries), zero, zero, zero, -lower])
+    second = (
+        lower,
+        [*trace, *(-side for side in sides), -_unit(0, 0)],
+        [*(-e for e in entries), zero, zero, zero, -lower],
+    )
     constant, linear, quadratic = (
-        np.concatenate([_svec(np.array(block[part])) for block in (first, second)], axis=-1) for part in range(3)
+        np.concatenate([symmetric_vector(np.array(block[part])) for block in (first, second)], axis=-1)
+        for part in range(3)
     )
     return constant, linear.T, quadratic.T
-
-
-def _svec(matrices: Array) -> Array:
-    """Return the upper triangles (..., 10) by columns of (..., 4, 4), off-diagonal entries times sqrt 2."""
-    rows, columns = zip(*((i, j) for j in range(4) for i in range(j + 1)), strict=True)
-    factor = np.where(np.array(rows) == np.array(columns), 1.0, np.sqrt(2.0))
-    return np.asarray(matrices[..., rows, columns] * factor)
 
 
 def _unit(i: int, j: int) -> Array:

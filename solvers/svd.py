@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optsat.attitude import dcm
 from optsat.attitude.alignment import polish, starting_weights
+from optsat.attitude.davenport import quaternion_from_dcm
 from optsat.forms import AlignmentForm, Point
 from optsat.solvers.alignment_point import alignment_point
 
@@ -26,4 +26,4 @@ class SingularValues:
         B = np.einsum("m,mi,mj->ij", starting_weights(form.weights), form.b_B, form.r_N)
         left, _, right = np.linalg.svd(B)
         rotation = left @ np.diag((1.0, 1.0, np.linalg.det(left) * np.linalg.det(right))) @ right
-        return alignment_point(form, *polish(form.b_B, form.r_N, form.weights, dcm.to_quaternion(rotation)))
+        return alignment_point(form, *polish(form.b_B, form.r_N, form.weights, quaternion_from_dcm(rotation)))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optsat.attitude import dcm
+from optsat.attitude.davenport import quaternion_from_dcm
 from optsat.attitude.two_vector import collinear, wahba_dcm
 from optsat.errors import InputError
 from optsat.forms import AlignmentForm, Point
@@ -29,7 +29,7 @@ class TwoVector:
         """Return q_BN of the least weighted loss."""
         assert isinstance(form, AlignmentForm)
         rotation = wahba_dcm(form.b_B, form.r_N, form.weights)
-        return Point(x=dcm.to_quaternion(rotation), dual=np.zeros(0), termination=Termination.CONVERGED)
+        return Point(x=quaternion_from_dcm(rotation), dual=np.zeros(0), termination=Termination.CONVERGED)
 
 
 @dataclass(frozen=True)
@@ -58,4 +58,4 @@ class Triad:
         weights = np.zeros(2)
         weights[primary] = 1.0
         rotation = wahba_dcm(form.b_B, form.r_N, weights)
-        return Point(x=dcm.to_quaternion(rotation), dual=np.zeros(0), termination=Termination.CONVERGED)
+        return Point(x=quaternion_from_dcm(rotation), dual=np.zeros(0), termination=Termination.CONVERGED)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from optsat.attitude import dcm
+from optsat.attitude.davenport import quaternion_from_dcm
 from optsat.attitude.two_vector import best_weights, collinear, wahba_dcm
 from optsat.forms import EnclosureForm, Point
 from optsat.solution import Termination
@@ -27,5 +27,5 @@ class TwoVectorEnclosure:
         assert isinstance(form, EnclosureForm)
         known = form.admissible
         weights = best_weights(known.b_B, known.r_N, known.angle_bound_rad)
-        q_BN = dcm.to_quaternion(wahba_dcm(known.b_B, known.r_N, weights))
+        q_BN = quaternion_from_dcm(wahba_dcm(known.b_B, known.r_N, weights))
         return Point(x=q_BN, dual=weights, termination=Termination.CONVERGED, iterations=24)

@@ -22,12 +22,14 @@ class Curvature:
     sharpness : least eigenvalue of the diagonally scaled Hessian over its own rounding error; > 1 proves a strict minimum
     free_axes_B : (k, 3) rotation axes along which the loss is flat to rounding, k = 0 at a strict minimum
     gradient : (3,) of the loss along the basis axes, relative to the square root of the Hessian's diagonal
+    amplification : radians of answer per radian of data error, an upper estimate [-]
     """
 
     step: Array
     sharpness: float
     free_axes_B: Array
     gradient: Array
+    amplification: float
 
 
 def heaviest_first_basis(b_B: Array, weights: Array) -> Array:
@@ -77,7 +79,12 @@ def curvature(b_B: Array, r_N: Array, weights: Array, q_BN: Array) -> Curvature:
     step = np.full(3, np.nan)
     if not flat.any() and values[0] > 0:
         step = (scale * (vectors @ ((vectors.T @ (scale * gradient)) / values))) @ basis
-    return Curvature(step, sharpness, free, scale * gradient)
+    amplification = np.inf
+    if sharpness > 1:
+        inverse = scale[:, None] * (vectors / values) @ vectors.T * scale
+        response = np.einsum("ij,m,mjc->mic", inverse, weights, b_cross)
+        amplification = float(2 * np.linalg.norm(response, axis=(1, 2)).sum())
+    return Curvature(step, sharpness, free, scale * gradient, amplification)
 
 
 def _scaled_eigen(matrix: Array, noise: Array) -> tuple[Array, Array, Array]:

@@ -3,6 +3,13 @@
 import numpy as np
 
 from optsat.arrays import Array
+from optsat.attitude import dcm, quaternion
+from optsat.attitude.edges import unchecked
+
+# inner-loop forms: their arguments come from this package, so the checks of the public edge are left out
+rotation_matrix = unchecked(dcm.from_quaternion)
+quaternion_from_dcm = unchecked(dcm.to_quaternion)
+canonical = unchecked(quaternion.canonical)
 
 
 def davenport_matrix(b_B: Array, r_N: Array, weights: Array) -> Array:
@@ -45,19 +52,6 @@ def turn(q_BN: Array, gibbs: Array) -> Array:
         (v + s * gibbs - np.cross(gibbs, v), s - np.sum(gibbs * v, axis=-1, keepdims=True)), axis=-1
     )
     return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
-
-
-def rotation_matrix(q_BN: Array) -> Array:
-    """Return A(q_BN) (..., 3, 3) of unit quaternions without any check: the inner-loop form of `dcm.from_quaternion`."""
-    x, y, z, s = (q_BN[..., k] for k in range(4))
-    A = np.empty((*q_BN.shape[:-1], 3, 3))
-    A[..., 0, 0] = 1 - 2 * (y * y + z * z)
-    A[..., 1, 1] = 1 - 2 * (x * x + z * z)
-    A[..., 2, 2] = 1 - 2 * (x * x + y * y)
-    A[..., 0, 1], A[..., 1, 0] = 2 * (x * y + s * z), 2 * (x * y - s * z)
-    A[..., 0, 2], A[..., 2, 0] = 2 * (x * z - s * y), 2 * (x * z + s * y)
-    A[..., 1, 2], A[..., 2, 1] = 2 * (y * z + s * x), 2 * (y * z - s * x)
-    return A
 
 
 def centred_blocks(u_B: Array, y_B: Array, level: Array) -> tuple[Array, Array]:

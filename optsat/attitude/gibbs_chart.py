@@ -44,7 +44,9 @@ class GibbsChart:
         # a cone's a is a difference of squares of size eps^2, its h carries the rounding of y, a cut's a has its full size
         cones = np.sqrt(2 * admissible.cone_versine) + np.linalg.norm(h[:m], axis=1) + scale + ROUNDOFF
         noise = 40 * ROUNDOFF * np.concatenate((cones, admissible.magnitude[m:])) / size
-        return GibbsChart(q_BN, scale, a / size, h / size[:, None], G / size[:, None, None], size, noise + 40 * ROUNDOFF)
+        return GibbsChart(
+            q_BN, scale, a / size, h / size[:, None], G / size[:, None, None], size, noise + 40 * ROUNDOFF
+        )
 
     def attitude(self, g: Array) -> Array:
         """Return the unit quaternions (..., 4) of chart points g (..., 3)."""
@@ -73,6 +75,17 @@ def ball_matrices(centre: Array, scale: float) -> tuple[Array, Array]:
     N[1:, 1:] = np.eye(3) + scale**2 * (c2 * np.eye(3) - np.outer(centre, centre))
     d = np.concatenate(([1.0], scale**2 * centre))
     return N, np.outer(d, d)
+
+
+def slab_matrices(low: Array, high: Array) -> Array:
+    """Return the three slabs of cells (..., 3) and the unit ball as matrices (..., 4, 4, 4) in (1, g)."""
+    Q = np.zeros((*low.shape[:-1], 4, 4, 4))
+    for axis in range(3):
+        Q[..., axis, 0, 0] = -low[..., axis] * high[..., axis]
+        Q[..., axis, 0, axis + 1] = Q[..., axis, axis + 1, 0] = (low[..., axis] + high[..., axis]) / 2
+        Q[..., axis, axis + 1, axis + 1] = -1.0
+    Q[..., 3, :, :] = np.diag((1.0, -1.0, -1.0, -1.0))
+    return Q
 
 
 def ball_levels(g: Array, centre: Array, scale: float) -> Array:

@@ -38,27 +38,12 @@ def wahba_dcm(b_B: Array, r_N: Array, weights: Array) -> Array:
         A = b3[..., :, None] * r3[..., None, :]
         for k, share in ((0, w / p), (1, v / p)):
             b, r = b_B[..., k, :], r_N[..., k, :]
-            plane = b[..., :, None] * r[..., None, :] + np.cross(b, b3)[..., :, None] * np.cross(r, r3)[..., None, :]
+            plane = (
+                b[..., :, None] * r[..., None, :]
+                + np.cross(b, b3)[..., :, None] * np.cross(r, r3)[..., None, :]
+            )
             A = A + share[..., None, None] * plane
     return np.asarray(A)
-
-
-def quaternion_from_dcm(dcm: Array) -> Array:
-    """Return the unit quaternion (..., 4) nearest to rotation matrices (..., 3, 3), by the largest column of 4 q q^T."""
-    t = np.trace(dcm, axis1=-2, axis2=-1)
-    outer = np.empty((*dcm.shape[:-2], 4, 4))
-    outer[..., :3, :3] = dcm + np.swapaxes(dcm, -1, -2)
-    for k in range(3):
-        outer[..., k, k] = 1 + 2 * dcm[..., k, k] - t
-    vector = np.stack(
-        (dcm[..., 1, 2] - dcm[..., 2, 1], dcm[..., 2, 0] - dcm[..., 0, 2], dcm[..., 0, 1] - dcm[..., 1, 0]), axis=-1
-    )
-    outer[..., :3, 3] = vector
-    outer[..., 3, :3] = vector
-    outer[..., 3, 3] = 1 + t
-    largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
-    column = np.take_along_axis(outer, largest[..., None, None], axis=-1)[..., 0]
-    return np.asarray(column / np.linalg.norm(column, axis=-1, keepdims=True))
 
 
 def squared_sine_bound(x: Array, versine: Array, theta_b: Array, theta_r: Array) -> Array:
@@ -83,7 +68,11 @@ def best_weights(b_B: Array, r_N: Array, angle_bound_rad: Array) -> Array:
     half = np.sin(angle_bound_rad / 2)
     with np.errstate(divide="ignore", invalid="ignore"):
         end = np.log(half[..., 1]) - np.log(half[..., 0])
-    end = np.clip(np.nan_to_num(end, nan=0.0, posinf=_LOG_RATIO_LIMIT, neginf=-_LOG_RATIO_LIMIT), -_LOG_RATIO_LIMIT, _LOG_RATIO_LIMIT)
+    end = np.clip(
+        np.nan_to_num(end, nan=0.0, posinf=_LOG_RATIO_LIMIT, neginf=-_LOG_RATIO_LIMIT),
+        -_LOG_RATIO_LIMIT,
+        _LOG_RATIO_LIMIT,
+    )
     theta_b, theta_r = pair_angle(b_B), pair_angle(r_N)
     versine = 2 * half**2
     low, high = np.minimum(end, 0.0), np.maximum(end, 0.0)

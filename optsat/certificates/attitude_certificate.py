@@ -53,19 +53,19 @@ class AttitudeCertificate:
         """Guaranteed attitude error [rad]."""
         return self.bound_rad
 
-    def _ball(self) -> Ball:
-        q_BN = self.q_BN / np.linalg.norm(self.q_BN)
-        return ball_of(sum_about(self.admissible, self.weights / self.weights.sum(), q_BN))
+    def ball(self) -> Ball:
+        """Return the ball about the stored q_BN that the stored weights prove, recomputed from the data."""
+        return ball_of(sum_about(self.admissible, self.weights / self.weights.sum(), self.q_BN))
 
     def margin(self) -> float:
         """Claimed less recomputed bound [rad]; for INCONSISTENT -s1, or the mismatch beyond the bounds [rad]."""
         if self.status is AttitudeStatus.UNBOUNDED:
             return 0.0
         if self.status is AttitudeStatus.INCONSISTENT:
-            return self._pair_excess() if self.pair else -float(self._ball().s1)
+            return self._pair_excess() if self.pair else -float(self.ball().s1)
         if self.refinement is not None:
             return self.bound_rad - self.refinement.bound_rad
-        return self.bound_rad - float(self._ball().bound_rad)
+        return self.bound_rad - float(self.ball().bound_rad)
 
     def _pair_excess(self) -> float:
         i, j = self.pair or (0, 0)
@@ -84,8 +84,8 @@ class AttitudeCertificate:
             return Verdict(False, "a direction is not a unit vector")
         if np.any(self.weights < 0) or not np.any(self.weights > 0):
             return Verdict(False, "the weights must be >= 0 and not all zero")
-        if abs(float(np.linalg.norm(self.q_BN)) - 1) > 1e-9:
-            return Verdict(False, "q_BN is not a unit quaternion")
+        if abs(float(np.linalg.norm(self.q_BN)) - 1) > 8 * ROUNDOFF:
+            return Verdict(False, "q_BN is not a unit quaternion to rounding")
         if self.status is AttitudeStatus.UNBOUNDED:
             if self.bound_rad < np.pi:
                 return Verdict(False, "an unbounded attitude cannot carry a bound below pi")
@@ -94,17 +94,21 @@ class AttitudeCertificate:
             return self._verify_empty()
         if self.refinement is not None:
             return self._verify_refinement(self.refinement)
-        recomputed = float(self._ball().bound_rad)
+        recomputed = float(self.ball().bound_rad)
         if not self.bound_rad >= recomputed * (1 - 1e-10):
-            return Verdict(False, f"recomputed bound {recomputed:.12g} rad exceeds the claimed {self.bound_rad:.12g} rad")
+            return Verdict(
+                False, f"recomputed bound {recomputed:.12g} rad exceeds the claimed {self.bound_rad:.12g} rad"
+            )
         return Verdict(True, f"recomputed bound {recomputed:.12g} rad")
 
     def _verify_empty(self) -> Verdict:
         if self.pair is not None:
             excess = self._pair_excess()
             return Verdict(excess > 0, f"mismatch of pairs {self.pair} beyond their bounds: {excess:.6g} rad")
-        ball = self._ball()
-        return Verdict(bool(ball.empty), f"s1 = {float(ball.s1):.6g}, s2 = {float(ball.s2):.6g}; both must be negative")
+        ball = self.ball()
+        return Verdict(
+            bool(ball.empty), f"s1 = {float(ball.s1):.6g}, s2 = {float(ball.s2):.6g}; both must be negative"
+        )
 
     def _verify_refinement(self, refinement: CellCover | Subpaving) -> Verdict:
         if not self.bound_rad >= refinement.bound_rad * (1 - 1e-10):
@@ -131,7 +135,11 @@ class AttitudeCertificate:
             "b_B": data.b_B.tolist(),
             "r_N": data.r_N.tolist(),
             "angle_bound_rad": data.angle_bound_rad.tolist(),
-            "cuts": {"u_B": data.cut_B.tolist(), "w_N": data.cut_N.tolist(), "level": data.cut_level.tolist()},
+            "cuts": {
+                "u_B": data.cut_B.tolist(),
+                "w_N": data.cut_N.tolist(),
+                "level": data.cut_level.tolist(),
+            },
             "pair": list(self.pair) if self.pair else None,
             "refinement": _refinement_content(self.refinement),
         }
@@ -169,7 +177,9 @@ class AttitudeCertificate:
         ):
             raise CertificateFormatError(f"`pair` must be null or two indices below {m}, got {pair!r}.")
         if content.get("status") not in [status.value for status in AttitudeStatus]:
-            raise CertificateFormatError(f"`status` must be ok, unbounded or inconsistent, got {content.get('status')!r}.")
+            raise CertificateFormatError(
+                f"`status` must be ok, unbounded or inconsistent, got {content.get('status')!r}."
+            )
         return AttitudeCertificate(
             admissible,
             reader.array("weights", (m + k,)),
@@ -242,7 +252,9 @@ class _Reader:
     def mapping(self, name: str) -> dict[str, Any]:
         value = self.content.get(name)
         if not isinstance(value, dict):
-            raise CertificateFormatError(f"`{self.prefix}{name}` must be an object, got {type(value).__name__}.")
+            raise CertificateFormatError(
+                f"`{self.prefix}{name}` must be an object, got {type(value).__name__}."
+            )
         return value
 
     def array(self, name: str, shape: tuple[int | None, ...]) -> Array:
@@ -258,5 +270,7 @@ class _Reader:
             want is None or want == got for want, got in zip(shape, array.shape, strict=True)
         )
         if not fits or not np.all(np.isfinite(array)):
-            raise CertificateFormatError(f"`{self.prefix}{name}` must be finite numbers of shape {shape}, got {array.shape}.")
+            raise CertificateFormatError(
+                f"`{self.prefix}{name}` must be finite numbers of shape {shape}, got {array.shape}."
+            )
         return array

@@ -11,20 +11,9 @@ import numpy as np
 
 from optsat.arrays import Array
 from optsat.attitude.admissible_set import AdmissibleSet
-from optsat.attitude.gibbs_chart import ROUNDOFF, GibbsChart, ball_matrices
+from optsat.attitude.gibbs_chart import ROUNDOFF, GibbsChart, ball_matrices, slab_matrices
 from optsat.certificates.attitude_bound import ball_of, sum_about
 from optsat.certificates.certificate import Verdict
-
-
-def slab_matrices(low: Array, high: Array) -> Array:
-    """Return the three slabs of cells (..., 3) and the unit ball as matrices (..., 4, 4, 4) in (1, g)."""
-    Q = np.zeros((*low.shape[:-1], 4, 4, 4))
-    for axis in range(3):
-        Q[..., axis, 0, 0] = -low[..., axis] * high[..., axis]
-        Q[..., axis, 0, axis + 1] = Q[..., axis, axis + 1, 0] = (low[..., axis] + high[..., axis]) / 2
-        Q[..., axis, axis + 1, axis + 1] = -1.0
-    Q[..., 3, :, :] = np.diag((1.0, -1.0, -1.0, -1.0))
-    return Q
 
 
 def proof_slack(
@@ -40,7 +29,12 @@ def proof_slack(
     y, z = multipliers[..., :n], multipliers[..., n:]
     slabs = slab_matrices(low, high)
     level = np.asarray(tau)[..., None, None]
-    proof = level * D - N - np.einsum("...n,nij->...ij", y, constraints) - np.einsum("...k,...kij->...ij", z, slabs)
+    proof = (
+        level * D
+        - N
+        - np.einsum("...n,nij->...ij", y, constraints)
+        - np.einsum("...k,...kij->...ij", z, slabs)
+    )
     terms = np.asarray(np.abs(tau)) * np.abs(D).max() + np.abs(N).max() + y @ np.ones(n) + z.sum(axis=-1)
     rounding = (n + 60) * ROUNDOFF * terms + y @ chart.rounding
     return np.asarray(np.linalg.eigvalsh(proof)[..., 0] - 4 * rounding)
@@ -72,7 +66,11 @@ class CellCover:
     def check(self, admissible: AdmissibleSet) -> Verdict:
         """Recompute the whole proof from the data."""
         chart = GibbsChart.about(admissible, self.pivot_BN, self.scale)
-        if not (np.all(self.pivot_weights >= 0) and np.all(self.multipliers >= 0) and np.all(np.isfinite(self.multipliers))):
+        if not (
+            np.all(self.pivot_weights >= 0)
+            and np.all(self.multipliers >= 0)
+            and np.all(np.isfinite(self.multipliers))
+        ):
             return Verdict(False, "a multiplier is negative or not finite")
         pivot = ball_of(sum_about(admissible, self.pivot_weights / self.pivot_weights.sum(), self.pivot_BN))
         if float(pivot.bound_rad) > 2 * np.arctan(self.scale) * (1 + 1e-12):
@@ -81,7 +79,9 @@ class CellCover:
             return Verdict(False, "the cells do not tile the cube around the pivot ball")
         slack = proof_slack(chart, self.centre, self.tau, self.low, self.high, self.multipliers)
         if not np.all(slack >= 0):
-            return Verdict(False, f"cell {int(np.argmin(slack))} is not proven (slack {float(slack.min()):.3g})")
+            return Verdict(
+                False, f"cell {int(np.argmin(slack))} is not proven (slack {float(slack.min()):.3g})"
+            )
         return Verdict(True, f"{len(self.low)} cells proven")
 
     def margin(self, admissible: AdmissibleSet) -> float:

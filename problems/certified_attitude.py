@@ -1,0 +1,197 @@
+"""Certified attitude: the attitude and the angle that its error surely does not exceed, from bounded measurement errors."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from optsat.arrays import Array, NormPolicy, angle_bounds, direction_pairs, pair_weights
+from optsat.attitude.admissible_set import AdmissibleSet
+from optsat.attitude.alignment import curvature, smallest_rotation
+from optsat.attitude.covariance import attitude_covariance
+from optsat.attitude.davenport import canonical, rotation_matrix
+from optsat.attitude.status import AttitudeStatus
+from optsat.certificates.attitude_bound import Ball, ellipsoid, enclose, sum_about
+from optsat.certificates.attitude_certificate import AttitudeCertificate
+from optsat.forms import EnclosureForm, Point
+from optsat.problems.component_box import ComponentBox, box_constraints
+from optsat.solution import Proof, Solution, Termination
+
+_PROOF = {
+    AttitudeStatus.OK: Proof.GLOBAL,
+    AttitudeStatus.UNBOUNDED: Proof.UNDECIDED,
+    AttitudeStatus.INCONSISTENT: Proof.INFEASIBLE,
+}
+# mismatch beyond the bounds that is granted to rounding of the input, as in the attitude problem depot
+_GRANTED_RAD = 1e-12
+
+
+@dataclass(frozen=True)
+class CertifiedAttitude:
+    """An attitude and a guaranteed bound on its error.
+
+    q_BN (4,), dcm_BN (3, 3) : the attitude, b_B = A(q_BN) r_N; the smallest rotation of the free set when UNBOUNDED
+    bound_rad : every attitude that fits the bounds is within this angle of q_BN; pi when UNBOUNDED, NaN when INCONSISTENT
+    status : OK | UNBOUNDED | INCONSISTENT; termination, proof : why the solver stopped, what is proven
+    weights (m,) : of the measurements, sum 1; ellipsoid_B (3, 3) : g^T E g <= 1 for g = tan(angle / 2) axis in B (None unless OK)
+    unobservable_axis_B (3,) : axis of the free rotation, when UNBOUNDED by geometry
+    inconsistent_pairs : index pairs whose mutual angle contradicts their bounds; suspects : indices that the proof rests on
+    certificate : re-checks the claim without a solver
+    """
+
+    q_BN: Array
+    dcm_BN: Array
+    bound_rad: float
+    status: AttitudeStatus
+    termination: Termination
+    proof: Proof
+    weights: Array
+    eigen_gap: float
+    ellipsoid_B: Array | None
+    unobservable_axis_B: Array | None
+    inconsistent_pairs: tuple[tuple[int, int], ...]
+    suspects: tuple[int, ...]
+    certificate: AttitudeCertificate
+    stats: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def bound_deg(self) -> float:
+        """The guaranteed bound [deg]."""
+        return float(np.degrees(self.bound_rad))
+
+    def covariance_B(self, sigma_rad: ArrayLike | None = None) -> Array:
+        """Return the first-order covariance (3, 3) [rad^2] in B of the attitude error.
+
+        sigma_rad : (m,) or scalar deviation per tangent axis [rad]; None takes errors spread evenly over their cones, bound / 2.
+
+        Raises
+        ------
+        InputError : the attitude is not OK (no covariance exists), or sigma_rad cannot be used.
+        """
+        data = self.certificate.admissible
+        sigma = data.angle_bound_rad / 2 if sigma_rad is None else sigma_rad
+        return attitude_covariance(data.b_B, self.weights, sigma)
+
+    def message(self) -> str:
+        """Return the result in one sentence."""
+        if self.status is AttitudeStatus.UNBOUNDED and self.unobservable_axis_B is not None:
+            axis = np.array2string(self.unobservable_axis_B, precision=4)
+            return f"Attitude not observable: the rotation about {axis} in B is undetermined. Add a direction off that axis."
+        return self.certificate.claim
+
+
+@dataclass(frozen=True)
+class CertifiedAttitudeProblem:
+    """Find the smallest ball of attitudes that surely holds the truth.
+
+    b_B, r_N : (m, 3) directions, or a ComponentBox each; angle_bound_rad : (m,) or scalar, body and reference bounds added,
+    in [0, pi) [rad]; may be None when a box is given (then it is what comes on top of the boxes: 0)
+    cuts : half-spaces u . A(q) w >= c as (u (k, 3), w (k, 3), c (k,))
+
+    Raises
+    ------
+    InputError : an argument that cannot be used, named with its first bad row; InfeasibleBoxError : a box off the unit sphere.
+    """
+
+    b_B: ArrayLike | ComponentBox
+    r_N: ArrayLike | ComponentBox
+    angle_bound_rad: ArrayLike | None = None
+    cuts: tuple[ArrayLike, ArrayLike, ArrayLike] | None = None
+    norm_policy: NormPolicy = "warn"
+    admissible: AdmissibleSet = field(init=False, repr=False)
+    inflation_rad: float = field(init=False, default=0.0)
+
+    def __post_init__(self) -> None:
+        b_B, r_N, bound, cut_B, cut_N, level = box_constraints(self.b_B, self.r_N, self.angle_bound_rad, self.cuts)
+        b, r = direction_pairs(b_B, r_N, self.norm_policy)
+        eps = angle_bounds("angle_bound_rad", bound, len(b))
+        admissible = AdmissibleSet(b, r, eps, cut_B, cut_N, level)
+        excess = admissible.mismatch_rad() - eps[:, None] - eps[None, :]
+        if 0.0 < float(excess.max()) <= _GRANTED_RAD:
+            object.__setattr__(self, "inflation_rad", _GRANTED_RAD)
+            admissible = AdmissibleSet(b, r, np.minimum(eps + _GRANTED_RAD, np.pi), cut_B, cut_N, level)
+        object.__setattr__(self, "admissible", admissible)
+
+    def lower(self) -> EnclosureForm:
+        """Return the enclosure form."""
+        return EnclosureForm(self.admissible)
+
+    def with_weights(self, weights: ArrayLike) -> Solution[CertifiedAttitude]:
+        """Return what the given weights (m,) of the cones prove; nothing is optimised."""
+        cones = pair_weights("weights", weights, self.admissible.cone_count)
+        padded = np.concatenate((cones, np.zeros(len(self.admissible.cut_level))))
+        return self.interpret(Point(x=np.zeros(4), dual=padded, termination=Termination.CONVERGED), "given weights")
+
+    def interpret(self, point: Point, solver: str) -> Solution[CertifiedAttitude]:
+        """Return the best ball that the point's weights (or an earlier pass's) prove, re-evaluated outward rounded."""
+        balls = [
+            (enclose(self.admissible, weights), weights) for weights in point.stats.get("candidates", (point.dual,))
+        ]
+        empty = [pair for pair in balls if bool(pair[0].empty)]
+        ball, weights = empty[0] if empty else min(balls, key=lambda pair: float(pair[0].bound_rad))
+        # granted rounding was added to the bounds, so two directions that just touch are no contradiction
+        contradicting = self.admissible.inconsistent_pairs(0.0 if self.inflation_rad else _GRANTED_RAD)
+        status = AttitudeStatus.INCONSISTENT if contradicting else ball.status
+        answer = self._answer(point, ball, weights / weights.sum(), status, contradicting)
+        return Solution(
+            answer=answer,
+            termination=point.termination,
+            proof=answer.proof,
+            residuals={"certificate_margin": answer.certificate.margin()},
+            certificate=answer.certificate,
+            stats={**answer.stats, "solver": solver, "iterations": point.iterations},
+        )
+
+    def _answer(
+        self,
+        point: Point,
+        ball: Ball,
+        weights: Array,
+        status: AttitudeStatus,
+        contradicting: tuple[tuple[int, int], ...],
+    ) -> CertifiedAttitude:
+        data = self.admissible
+        cones = weights[: data.cone_count]
+        q_BN, axis, E = ball.q_BN, None, None
+        bound = float(ball.bound_rad)
+        if status is AttitudeStatus.UNBOUNDED and float(cones.sum()) > 0:
+            here = curvature(data.b_B, data.r_N, cones, q_BN)
+            if len(here.free_axes_B):
+                q_BN = smallest_rotation(q_BN, here.free_axes_B)
+            axis = here.free_axes_B[0] if len(here.free_axes_B) == 1 else None
+        q_BN = canonical(q_BN)
+        certificate = AttitudeCertificate(
+            admissible=data,
+            weights=weights,
+            q_BN=q_BN,
+            bound_rad=0.0 if status is AttitudeStatus.INCONSISTENT else bound,
+            status=status,
+            pair=contradicting[0] if contradicting else None,
+        )
+        if status is AttitudeStatus.OK:
+            # claim what the stored numbers prove, bit for bit what `verify` will recompute
+            ball = certificate.ball()
+            bound = float(ball.bound_rad)
+            certificate = replace(certificate, bound_rad=bound)
+            E = ellipsoid(sum_about(data, weights, q_BN), ball)
+        suspects = tuple(sorted({i for pair in contradicting for i in pair}))
+        if status is AttitudeStatus.INCONSISTENT and not suspects:
+            suspects = tuple(np.flatnonzero(cones > 1e-3 * cones.max()).tolist())
+        return CertifiedAttitude(
+            q_BN=q_BN,
+            dcm_BN=rotation_matrix(q_BN),
+            bound_rad=float("nan") if status is AttitudeStatus.INCONSISTENT else bound,
+            status=status,
+            termination=point.termination,
+            proof=_PROOF[status],
+            weights=cones / cones.sum() if float(cones.sum()) > 0 else cones,
+            eigen_gap=float(ball.s1 - ball.s2),
+            ellipsoid_B=E,
+            unobservable_axis_B=axis,
+            inconsistent_pairs=contradicting,
+            suspects=suspects,
+            certificate=certificate,
+            stats={"inflation_rad": self.inflation_rad, "solver_status": point.stats.get("status", "")},
+        )

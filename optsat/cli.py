@@ -49,7 +49,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Example: optsat doctor. Exit codes: 0 done, 1 a finding, 2 wrong usage or bad input.",
 )
-app.add_typer(study.app, name="study")
+app.add_typer(study.app, name="study", epilog="Example: optsat study list")
 app.command("doctor", epilog="Example: optsat doctor --json")(doctor.doctor_command)
 
 

@@ -87,7 +87,8 @@ def _in_words(result: "StudyResult") -> str:
         )
     if result.failures:
         first = result.failures[0]
-        parts.append(f"{len(result.failures)} cases failed, first case {first.case}: {first.error}: {first.message}")
+        count = f"{len(result.failures)} of {result.cases} cases failed"
+        parts.append(f"{count}; the first is case {first.case}: {first.error}: {first.message}")
     return "\n".join(parts)
 
 

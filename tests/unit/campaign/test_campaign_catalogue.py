@@ -48,7 +48,7 @@ def test_loading(name: str) -> None:
 
 @pytest.mark.usefixtures("studies")
 def test_a_misspelt_name_is_answered_with_the_nearest() -> None:
-    with pytest.raises(InputError, match="no study `toy-studdy`. Did you mean `toy-study`"):
+    with pytest.raises(InputError, match=r"no study `toy-studdy`. Did you mean `toy-study`"):
         catalogue.load_study("toy-studdy")
 
 

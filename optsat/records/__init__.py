@@ -1,0 +1,1 @@
+"""Measurement logs in and out."""

@@ -106,23 +106,21 @@ def _casadi_computes() -> Finding:
 
 def _clarabel_solves() -> Finding:
     try:
-        import clarabel
         import numpy as np
-        from scipy import sparse
 
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        solution = clarabel.DefaultSolver(
-            sparse.csc_matrix((2, 2)),
-            np.ones(2),
-            sparse.csc_matrix([[0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]]),
-            np.array([1.0, 0.0, 0.0]),
-            [clarabel.SecondOrderConeT(3)],
-            settings,
-        ).solve()
+        from optsat.forms import ConicForm
+        from optsat.solvers.clarabel import Clarabel
+
+        disc = ConicForm(
+            q=np.ones(2),
+            A=np.array([[0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]]),
+            b=np.array([1.0, 0.0, 0.0]),
+            cones=(("second_order", 3),),
+        )
+        least = float(Clarabel().run(disc).x.sum())
     except (ImportError, RuntimeError) as error:
         return Finding("self-check clarabel", Health.BROKEN, str(error))
-    return _judge("self-check clarabel", "the least x + y on the unit disc", solution.obj_val, -(2**0.5))
+    return _judge("self-check clarabel", "the least x + y on the unit disc", least, -(2**0.5))
 
 
 def _judge(subject: str, what: str, got: float, exact: float) -> Finding:

@@ -14,8 +14,10 @@ ROOT = Path(__file__).resolve().parents[1]
 MAPPED = ("problems", "solvers", "studies")
 LONGEST = 400
 
+# the public verbs pick problems and solvers for their callers
+VERBS = {"determine"}
 # what knows everything: the public names and verbs, the command line, the studies
-TOP = {"__init__", "determine", "cli", "commands", "doctor", "studies"}
+TOP = {"__init__", *VERBS, "cli", "commands", "doctor", "studies"}
 
 # slow to import, so only inside functions
 HEAVY = ("casadi", "clarabel", "cvxpy", "matplotlib", "scipy.optimize", "typer")
@@ -106,7 +108,7 @@ def is_sanctioned(found: Import) -> bool:
 
 
 def core_knows_no_problem_and_no_solver(tree: Tree) -> list[str]:
-    # an estimator may pose a problem and call `solve`; it never picks a solver
+    # an estimator may pose a problem and call `solve` or a verb; it never picks a solver
     return [
         str(found)
         for found in imports(tree)
@@ -124,6 +126,7 @@ def only_the_top_knows_the_top(tree: Tree) -> list[str]:
         if found.unit not in TOP
         and found.target_unit is not None
         and (found.target_unit in TOP or found.target_unit not in units)
+        and not (found.unit == "estimators" and found.target_unit in VERBS)
     ]
 
 

@@ -5,7 +5,7 @@ import functools
 import importlib
 import multiprocessing
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 
@@ -22,6 +22,7 @@ from optsat.errors import InputError, OptsatError
 _CASE_ERRORS = (OptsatError, ArithmeticError, ValueError, RuntimeError)
 
 Progress = Callable[[int, int], None]
+Outcomes = Generator[list[Row | Failure], None, None]
 
 
 def run_study(
@@ -51,10 +52,7 @@ def run_study(
     design = study.cases(count)
     if len(design) != count:
         raise InputError(f"study {study.name} laid out {len(design)} cases where {count} were asked for.")
-    if workers == 1:
-        chunks = (_run_chunk(study, design, seed, [number]) for number in range(count))
-    else:
-        chunks = _in_processes(study, count, seed, workers)
+    chunks = _in_processes(study, count, seed, workers) if workers > 1 else _in_turn(study, design, seed)
     outcomes: list[Row | Failure] = []
     with contextlib.closing(chunks):
         for chunk in chunks:
@@ -101,7 +99,12 @@ def _scalar(study: Study, number: int, name: str, value: object) -> Scalar:
     return plain
 
 
-def _in_processes(study: Study, count: int, seed: int, workers: int) -> Iterator[list[Row | Failure]]:
+def _in_turn(study: Study, design: Sequence[Case], seed: int) -> Outcomes:
+    for number in range(len(design)):
+        yield _run_chunk(study, design, seed, [number])
+
+
+def _in_processes(study: Study, count: int, seed: int, workers: int) -> Outcomes:
     module = study.run.__module__
     if getattr(importlib.import_module(module), "study", None) is not study:
         raise InputError(

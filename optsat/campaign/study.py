@@ -12,7 +12,8 @@ from optsat.campaign.claim import Claim
 from optsat.errors import InputError
 
 Scalar = float | int | str | bool
-Row = Mapping[str, Scalar]
+# scalars only, which the runner checks; typed loosely so that `np.mean([row[name] for row in rows])` needs no cast
+Row = Mapping[str, Any]
 Case = Mapping[str, Any]
 
 

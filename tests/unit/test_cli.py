@@ -15,7 +15,7 @@ from optsat.campaign import catalogue
 from optsat.cli import app
 
 TOY = Path(__file__).parent / "campaign" / "toy_study.py"
-COMMANDS = ([], ["study"], ["study", "list"], ["study", "run"], ["doctor"])
+COMMANDS: tuple[list[str], ...] = ([], ["study"], ["study", "list"], ["study", "run"], ["doctor"])
 
 
 @pytest.fixture

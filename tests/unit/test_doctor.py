@@ -7,12 +7,14 @@ from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from optsat import doctor
 from optsat.cli import app
 from optsat.doctor import Finding, Health
+from optsat.solvers import clarabel
 
 
 def _names(requirements: list[str]) -> set[str]:
@@ -55,16 +57,15 @@ def test_threads_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("library", ["casadi", "clarabel"])
 def test_a_library_that_does_not_import_is_reported(library: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, library, None)
+    clarabel._library.cache_clear()
     found = {finding.subject: finding for finding in doctor.examine()}[f"self-check {library}"]
     assert found.health is Health.BROKEN
     assert library in found.says
 
 
 def test_a_library_that_computes_wrongly_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    import clarabel
-
-    wrong = SimpleNamespace(solve=lambda: SimpleNamespace(obj_val=-1.5))
-    monkeypatch.setattr(clarabel, "DefaultSolver", lambda *_arguments: wrong)
+    wrong = SimpleNamespace(x=np.array([-1.0, -0.5]))
+    monkeypatch.setattr(clarabel.Clarabel, "run", lambda *_arguments: wrong)
     found = {finding.subject: finding for finding in doctor.examine()}["self-check clarabel"]
     assert found.health is Health.BROKEN
     assert "should be -1.41421, got -1.5" in found.says

@@ -64,7 +64,7 @@ def test_a_study_that_workers_cannot_import_is_refused() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"cases": 0}, {"workers": 0}, {"seed": -1}])
-def test_counts_are_checked(wrong: dict[str, int]) -> None:
+def test_counts_are_checked(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=f"{next(iter(wrong))}="):
         run_study(toy_study.study, **wrong)
 

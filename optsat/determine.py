@@ -1,16 +1,16 @@
 """Determine: attitude from vector observations, with a proof of the optimum or a guaranteed bound on the error."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from optsat.arrays import Array, NormPolicy, finite_array, normalise_rows
-from optsat.attitude.davenport import canonical, quaternion_from_dcm
+from optsat.attitude.davenport import quaternion_from_dcm
 from optsat.attitude.status import AttitudeStatus
 from optsat.attitude.two_vector import best_weights, collinear, pair_angle, wahba_dcm
-from optsat.certificates.attitude_bound import ball_of, recentre, weighted_sum
+from optsat.certificates.attitude_bound import ball_of, weighted_sum
 from optsat.errors import InputError, explain_unknown_options, nearest_name
 from optsat.solution import Proof, Solution
 from optsat.solve import solve
@@ -24,6 +24,7 @@ WahbaMethod = Literal["davenport", "svd", "two_vector", "triad"]
 Refinement = Literal["cells", "subpaving"]
 
 _BLOCK = 2048
+_OK, _UNBOUNDED, _INCONSISTENT = range(3)
 
 
 @explain_unknown_options
@@ -42,7 +43,8 @@ def wahba(
 
     Raises
     ------
-    InputError : input that cannot be used, or an unknown method. UnsupportedFormError : the method cannot pose this problem.
+    InputError : input that cannot be used, or an unknown method. UnsupportedFormError : the method cannot pose this
+    problem.
     NotProvenError : the method's answer is not the optimum (TRIAD on data that disagree); kept in `error.solution`.
     """
     from optsat.problems.wahba import Wahba
@@ -89,7 +91,8 @@ def certify_attitude(
     attitude = solution.answer
     if refine is None or attitude.status is not AttitudeStatus.OK or attitude.bound_rad >= 2 * np.pi / 3:
         return attitude
-    from optsat.solvers import CellCoverSolver, SubpavingSolver
+    from optsat.solvers.cell_cover import CellCoverSolver
+    from optsat.solvers.subpaving import SubpavingSolver
 
     refined = solve(RefinedEnclosure(attitude), CellCoverSolver() if refine == "cells" else SubpavingSolver())
     return refined.answer
@@ -99,13 +102,31 @@ def certify_attitude(
 class CertifiedBatch:
     """Attitudes and guaranteed bounds of many poses.
 
-    q_BN (n, 4), bound_rad (n,) [rad] (pi when unbounded, NaN when inconsistent), weights (n, m), status (n,) of AttitudeStatus
+    q_BN (n, 4); bound_rad (n,) [rad], pi when unbounded, NaN when inconsistent; weights (n, m), sum 1
+    status_index (n,) : place in `statuses`
     """
+
+    statuses: ClassVar[tuple[AttitudeStatus, ...]] = tuple(AttitudeStatus)
 
     q_BN: Array
     bound_rad: Array
     weights: Array
-    status: "np.ndarray[tuple[int], np.dtype[np.object_]]"
+    status_index: NDArray[np.int8]
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Which poses are determined (n,)."""
+        return np.asarray(self.status_index == _OK)
+
+    @property
+    def inconsistent(self) -> NDArray[np.bool_]:
+        """Which poses contradict their bounds (n,)."""
+        return np.asarray(self.status_index == _INCONSISTENT)
+
+    @property
+    def unbounded(self) -> NDArray[np.bool_]:
+        """Which poses leave a rotation free (n,)."""
+        return np.asarray(self.status_index == _UNBOUNDED)
 
     def __len__(self) -> int:
         return len(self.q_BN)
@@ -117,7 +138,8 @@ def certify_attitude_batch(
 ) -> CertifiedBatch:
     """Return attitudes and guaranteed bounds of n poses of m vectors each, as arrays.
 
-    b_B, r_N : (n, m, 3); angle_bound_rad : scalar, (m,) or (n, m) [rad]. Two vectors run as whole arrays, more pose by pose.
+    b_B, r_N : (n, m, 3); angle_bound_rad : scalar, (m,) or (n, m) [rad]. Two vectors run as whole arrays, more pose
+    by pose.
 
     Raises
     ------
@@ -132,16 +154,19 @@ def certify_attitude_batch(
     eps = _batch_bounds(angle_bound_rad, b.shape[:2])
     n, m = eps.shape
     q_BN, bound, weights = np.empty((n, 4)), np.empty(n), np.empty((n, m))
-    status = np.empty(n, dtype=object)
+    status = np.empty(n, dtype=np.int8)
     special = np.ones(n, dtype=bool)
     if m == 2:
         special = np.empty(n, dtype=bool)
         for first in range(0, n, _BLOCK):
             part = slice(first, first + _BLOCK)
-            q_BN[part], bound[part], weights[part], status[part], special[part] = _two_vectors(b[part], r[part], eps[part])
+            q_BN[part], bound[part], weights[part], status[part], special[part] = _two_vectors(
+                b[part], r[part], eps[part]
+            )
     for k in np.flatnonzero(special):
         one = certify_attitude(b[k], r[k], eps[k], norm_policy="silent")
-        q_BN[k], bound[k], weights[k], status[k] = one.q_BN, one.bound_rad, one.weights, one.status
+        q_BN[k], bound[k], weights[k] = one.q_BN, one.bound_rad, one.weights
+        status[k] = CertifiedBatch.statuses.index(one.status)
     return CertifiedBatch(q_BN, bound, weights, status)
 
 
@@ -158,23 +183,15 @@ def _batch_bounds(value: ArrayLike, shape: tuple[int, ...]) -> Array:
     return np.array(np.broadcast_to(eps, shape))
 
 
-def _two_vectors(b: Array, r: Array, eps: Array) -> tuple[Array, Array, Array, "np.ndarray[tuple[int], np.dtype[np.object_]]", "np.ndarray[tuple[int], np.dtype[np.bool_]]"]:
+def _two_vectors(b: Array, r: Array, eps: Array) -> tuple[Array, Array, Array, NDArray[np.int8], NDArray[np.bool_]]:
     """Return q, bound, weights, status of n two-vector poses, and which ones the closed form does not cover."""
     excess = np.abs(pair_angle(b) - pair_angle(r)) - eps.sum(axis=1)
     flat = collinear(b, r)
-    special = flat | ((excess > 0) & (excess <= 1e-12))
     safe_b, safe_r = np.where(flat[:, None, None], np.eye(3)[:2], b), np.where(flat[:, None, None], np.eye(3)[:2], r)
     weights = best_weights(safe_b, safe_r, eps)
-    q = quaternion_from_dcm(wahba_dcm(safe_b, safe_r, weights))
-    versine = 2 * np.sin(eps / 2) ** 2
-    total = weighted_sum(safe_b, safe_r, versine, weights, q)
-    total = weighted_sum(safe_b, safe_r, versine, weights, canonical(recentre(total)))
-    ball = ball_of(total)
+    q_BN = quaternion_from_dcm(wahba_dcm(safe_b, safe_r, weights))
+    ball = ball_of(weighted_sum(safe_b, safe_r, 2 * np.sin(eps / 2) ** 2, weights, q_BN))
     inconsistent = (excess > 1e-12) | ball.empty
+    status = np.where(inconsistent, _INCONSISTENT, np.where(ball.bound_rad < np.pi, _OK, _UNBOUNDED))
     bound = np.where(inconsistent, np.nan, ball.bound_rad)
-    status = np.where(
-        inconsistent,
-        AttitudeStatus.INCONSISTENT,
-        np.where(ball.bound_rad < np.pi, AttitudeStatus.OK, AttitudeStatus.UNBOUNDED),
-    )
-    return total.q_BN, bound, weights, status, special
+    return q_BN, bound, weights, status.astype(np.int8), flat | ((excess > 0) & (excess <= 1e-12))

@@ -29,12 +29,8 @@ class InfeasibleBoxError(InputError):
 class RecordError(OptsatError, ValueError):
     """A measurement log is wrong at a file, line and column."""
 
-    def __init__(
-        self, message: str, *, file: str, line: int | None = None, column: str | None = None
-    ) -> None:
-        where = (
-            file + (f", line {line}" if line is not None else "") + (f", column {column}" if column else "")
-        )
+    def __init__(self, message: str, *, file: str, line: int | None = None, column: str | None = None) -> None:
+        where = file + (f", line {line}" if line is not None else "") + (f", column {column}" if column else "")
         super().__init__(f"{where}: {message}")
         self.file, self.line, self.column = file, line, column
 
@@ -73,9 +69,7 @@ def explain_unknown_options(function: Callable[P, R]) -> Callable[P, R]:
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
         for name in kwargs:
             if name not in known:
-                raise UnknownOptionError(
-                    f"{function.__name__} has no option `{name}`.{nearest_name(name, known)}"
-                )
+                raise UnknownOptionError(f"{function.__name__} has no option `{name}`.{nearest_name(name, known)}")
         return function(*args, **kwargs)
 
     return checked

@@ -78,7 +78,8 @@ def symmetric_vector(matrices: Array) -> Array:
 class CoverForm:
     """Tighten a proven ball of attitudes by covering it with cells.
 
-    admissible : the set; q_BN, weights : centre and multipliers of the proven ball; scale : tan(theta / 2) of its radius, finite
+    admissible : the set; q_BN, weights : centre and multipliers of the proven ball; scale : tan(theta / 2) of its
+    radius, finite
     What the cells are is the solver's own matter and travels in the point's `stats`.
     """
 

@@ -6,8 +6,7 @@ from optsat.errors import UnsupportedFormError
 from optsat.forms import Point
 from optsat.solution import Solution
 
-A = TypeVar("A", covariant=True)
-T = TypeVar("T")
+A = TypeVar("A")
 
 
 class Problem(Protocol[A]):
@@ -39,7 +38,7 @@ class Solver(Protocol):
         ...
 
 
-def solve(problem: Problem[T], solver: Solver | None = None, start: Point | None = None) -> Solution[T]:
+def solve(problem: Problem[A], solver: Solver | None = None, start: Point | None = None) -> Solution[A]:
     """Return the solution of `problem` by `solver`, or by the first solver of the ordered table that accepts its form.
 
     Raises

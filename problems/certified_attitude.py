@@ -1,4 +1,4 @@
-"""Certified attitude: the attitude and the angle that its error surely does not exceed, from bounded measurement errors."""
+"""Certified attitude: an attitude and the angle that its error surely does not exceed, from bounded errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,8 +13,9 @@ from optsat.attitude.alignment import curvature, smallest_rotation
 from optsat.attitude.covariance import attitude_covariance
 from optsat.attitude.davenport import canonical, rotation_matrix
 from optsat.attitude.status import AttitudeStatus
-from optsat.certificates.attitude_bound import Ball, ellipsoid, enclose, sum_about
+from optsat.certificates.attitude_bound import Ball, best_centre, ellipsoid, sum_about
 from optsat.certificates.attitude_certificate import AttitudeCertificate
+from optsat.errors import InputError
 from optsat.forms import EnclosureForm, Point
 from optsat.problems.component_box import ComponentBox, box_constraints
 from optsat.solution import Proof, Solution, Termination
@@ -33,11 +34,13 @@ class CertifiedAttitude:
     """An attitude and a guaranteed bound on its error.
 
     q_BN (4,), dcm_BN (3, 3) : the attitude, b_B = A(q_BN) r_N; the smallest rotation of the free set when UNBOUNDED
-    bound_rad : every attitude that fits the bounds is within this angle of q_BN; pi when UNBOUNDED, NaN when INCONSISTENT
+    bound_rad : every attitude that fits the bounds is within this angle of q_BN; pi when UNBOUNDED, NaN when
+    INCONSISTENT
     status : OK | UNBOUNDED | INCONSISTENT; termination, proof : why the solver stopped, what is proven
-    weights (m,) : of the measurements, sum 1; ellipsoid_B (3, 3) : g^T E g <= 1 for g = tan(angle / 2) axis in B (None unless OK)
+    weights (m,) : of the measurements, sum 1
     unobservable_axis_B (3,) : axis of the free rotation, when UNBOUNDED by geometry
-    inconsistent_pairs : index pairs whose mutual angle contradicts their bounds; suspects : indices that the proof rests on
+    inconsistent_pairs : index pairs whose mutual angle contradicts their bounds; suspects : indices that the proof
+    rests on
     certificate : re-checks the claim without a solver
     """
 
@@ -49,7 +52,6 @@ class CertifiedAttitude:
     proof: Proof
     weights: Array
     eigen_gap: float
-    ellipsoid_B: Array | None
     unobservable_axis_B: Array | None
     inconsistent_pairs: tuple[tuple[int, int], ...]
     suspects: tuple[int, ...]
@@ -64,7 +66,8 @@ class CertifiedAttitude:
     def covariance_B(self, sigma_rad: ArrayLike | None = None) -> Array:
         """Return the first-order covariance (3, 3) [rad^2] in B of the attitude error.
 
-        sigma_rad : (m,) or scalar deviation per tangent axis [rad]; None takes errors spread evenly over their cones, bound / 2.
+        sigma_rad : (m,) or scalar deviation per tangent axis [rad]; None takes errors spread evenly over their
+        cones, bound / 2.
 
         Raises
         ------
@@ -74,11 +77,32 @@ class CertifiedAttitude:
         sigma = data.angle_bound_rad / 2 if sigma_rad is None else sigma_rad
         return attitude_covariance(data.b_B, self.weights, sigma)
 
+    def ellipsoid_B(self) -> Array:
+        """Return E (3, 3) with g^T E g <= 1 for the error g = tan(angle / 2) axis in B of every admissible attitude.
+
+        Stated about the centre of the two-eigenvalue proof, q_BN unless the bound was refined.
+
+        Raises
+        ------
+        InputError : the attitude is not OK, so no ellipsoid is finite.
+        """
+        if self.status is not AttitudeStatus.OK:
+            raise InputError(
+                f"The attitude is {self.status.value}; only an attitude that is ok has an error ellipsoid."
+            )
+        plain = replace(self.certificate, refinement=None)
+        if self.certificate.refinement is not None:
+            plain = replace(plain, q_BN=self.certificate.refinement.pivot_BN)
+        return ellipsoid(sum_about(plain.admissible, plain.weights, plain.q_BN), plain.ball())
+
     def message(self) -> str:
         """Return the result in one sentence."""
         if self.status is AttitudeStatus.UNBOUNDED and self.unobservable_axis_B is not None:
             axis = np.array2string(self.unobservable_axis_B, precision=4)
-            return f"Attitude not observable: the rotation about {axis} in B is undetermined. Add a direction off that axis."
+            return (
+                f"Attitude not observable: the rotation about {axis} in B is undetermined. "
+                "Add a direction off that axis."
+            )
         return self.certificate.claim
 
 
@@ -86,13 +110,15 @@ class CertifiedAttitude:
 class CertifiedAttitudeProblem:
     """Find the smallest ball of attitudes that surely holds the truth.
 
-    b_B, r_N : (m, 3) directions, or a ComponentBox each; angle_bound_rad : (m,) or scalar, body and reference bounds added,
+    b_B, r_N : (m, 3) directions, or a ComponentBox each; angle_bound_rad : (m,) or scalar, body and reference bounds
+    added,
     in [0, pi) [rad]; may be None when a box is given (then it is what comes on top of the boxes: 0)
     cuts : half-spaces u . A(q) w >= c as (u (k, 3), w (k, 3), c (k,))
 
     Raises
     ------
-    InputError : an argument that cannot be used, named with its first bad row; InfeasibleBoxError : a box off the unit sphere.
+    InputError : an argument that cannot be used, named with its first bad row; InfeasibleBoxError : a box off the
+    unit sphere.
     """
 
     b_B: ArrayLike | ComponentBox
@@ -125,70 +151,61 @@ class CertifiedAttitudeProblem:
         return self.interpret(Point(x=np.zeros(4), dual=padded, termination=Termination.CONVERGED), "given weights")
 
     def interpret(self, point: Point, solver: str) -> Solution[CertifiedAttitude]:
-        """Return the best ball that the point's weights (or an earlier pass's) prove, re-evaluated outward rounded."""
-        balls = [
-            (enclose(self.admissible, weights), weights) for weights in point.stats.get("candidates", (point.dual,))
-        ]
-        empty = [pair for pair in balls if bool(pair[0].empty)]
-        ball, weights = empty[0] if empty else min(balls, key=lambda pair: float(pair[0].bound_rad))
-        # granted rounding was added to the bounds, so two directions that just touch are no contradiction
-        contradicting = self.admissible.inconsistent_pairs(0.0 if self.inflation_rad else _GRANTED_RAD)
-        status = AttitudeStatus.INCONSISTENT if contradicting else ball.status
-        answer = self._answer(point, ball, weights / weights.sum(), status, contradicting)
+        """Return the ball that the point's weights prove, re-evaluated outward rounded.
+
+        An earlier pass's where they prove none.
+        """
+        certificate, ball = self._certificate(point.dual)
+        if ball.status is AttitudeStatus.UNBOUNDED:
+            others = (self._certificate(weights) for weights in point.stats.get("candidates", ()))
+            certificate, ball = min(
+                ((certificate, ball), *others), key=lambda pair: (not bool(pair[1].empty), float(pair[1].bound_rad))
+            )
+        answer = self._answer(point, certificate, ball)
         return Solution(
             answer=answer,
             termination=point.termination,
             proof=answer.proof,
-            residuals={"certificate_margin": answer.certificate.margin()},
+            residuals={"s1": float(ball.s1), "s2": float(ball.s2)},
             certificate=answer.certificate,
             stats={**answer.stats, "solver": solver, "iterations": point.iterations},
         )
 
-    def _answer(
-        self,
-        point: Point,
-        ball: Ball,
-        weights: Array,
-        status: AttitudeStatus,
-        contradicting: tuple[tuple[int, int], ...],
-    ) -> CertifiedAttitude:
+    def _certificate(self, weights: Array) -> tuple[AttitudeCertificate, Ball]:
+        """Return the certificate of the weights, its bound bit for bit what `verify` will recompute."""
+        weights = weights / weights.sum()
+        q_BN = canonical(best_centre(self.admissible, weights))
+        draft = AttitudeCertificate(self.admissible, weights, q_BN, np.pi, AttitudeStatus.UNBOUNDED)
+        ball = draft.ball()
+        bound = 0.0 if bool(ball.empty) else float(ball.bound_rad)
+        return replace(draft, bound_rad=bound, status=ball.status), ball
+
+    def _answer(self, point: Point, certificate: AttitudeCertificate, ball: Ball) -> CertifiedAttitude:
         data = self.admissible
-        cones = weights[: data.cone_count]
-        q_BN, axis, E = ball.q_BN, None, None
-        bound = float(ball.bound_rad)
-        if status is AttitudeStatus.UNBOUNDED and float(cones.sum()) > 0:
-            here = curvature(data.b_B, data.r_N, cones, q_BN)
+        cones = certificate.weights[: data.cone_count]
+        axis = None
+        if ball.status is AttitudeStatus.UNBOUNDED and float(cones.sum()) > 0:
+            here = curvature(data.b_B, data.r_N, cones, certificate.q_BN)
             if len(here.free_axes_B):
-                q_BN = smallest_rotation(q_BN, here.free_axes_B)
+                q_BN = canonical(smallest_rotation(certificate.q_BN, here.free_axes_B))
+                certificate = replace(certificate, q_BN=q_BN)
             axis = here.free_axes_B[0] if len(here.free_axes_B) == 1 else None
-        q_BN = canonical(q_BN)
-        certificate = AttitudeCertificate(
-            admissible=data,
-            weights=weights,
-            q_BN=q_BN,
-            bound_rad=0.0 if status is AttitudeStatus.INCONSISTENT else bound,
-            status=status,
-            pair=contradicting[0] if contradicting else None,
-        )
-        if status is AttitudeStatus.OK:
-            # claim what the stored numbers prove, bit for bit what `verify` will recompute
-            ball = certificate.ball()
-            bound = float(ball.bound_rad)
-            certificate = replace(certificate, bound_rad=bound)
-            E = ellipsoid(sum_about(data, weights, q_BN), ball)
+        # granted rounding was added to the bounds, so two directions that just touch are no contradiction
+        contradicting = data.inconsistent_pairs(0.0 if self.inflation_rad else _GRANTED_RAD)
+        if contradicting:
+            certificate = replace(certificate, status=AttitudeStatus.INCONSISTENT, bound_rad=0.0, pair=contradicting[0])
         suspects = tuple(sorted({i for pair in contradicting for i in pair}))
-        if status is AttitudeStatus.INCONSISTENT and not suspects:
+        if certificate.status is AttitudeStatus.INCONSISTENT and not suspects:
             suspects = tuple(np.flatnonzero(cones > 1e-3 * cones.max()).tolist())
         return CertifiedAttitude(
-            q_BN=q_BN,
-            dcm_BN=rotation_matrix(q_BN),
-            bound_rad=float("nan") if status is AttitudeStatus.INCONSISTENT else bound,
-            status=status,
+            q_BN=certificate.q_BN,
+            dcm_BN=rotation_matrix(certificate.q_BN),
+            bound_rad=float("nan") if certificate.status is AttitudeStatus.INCONSISTENT else certificate.bound_rad,
+            status=certificate.status,
             termination=point.termination,
-            proof=_PROOF[status],
+            proof=_PROOF[certificate.status],
             weights=cones / cones.sum() if float(cones.sum()) > 0 else cones,
             eigen_gap=float(ball.s1 - ball.s2),
-            ellipsoid_B=E,
             unobservable_axis_B=axis,
             inconsistent_pairs=contradicting,
             suspects=suspects,

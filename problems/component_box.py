@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from optsat.arrays import Array, finite_array
 from optsat.errors import InfeasibleBoxError, InputError
@@ -63,9 +63,7 @@ class ComponentBox:
         return ComponentBox(middle - half, middle + half)
 
     @staticmethod
-    def from_relative(
-        measured: ArrayLike, fraction: float, mode: Literal["safe", "paper"] = "safe"
-    ) -> "ComponentBox":
+    def from_relative(measured: ArrayLike, fraction: float, mode: Literal["safe", "paper"] = "safe") -> "ComponentBox":
         """Return boxes for components corrupted as x (1 + fraction u), |u| <= 1.
 
         "safe" : [|x| / (1 + f), |x| / (1 - f)] with the sign of x, which surely holds the truth;
@@ -98,7 +96,9 @@ class ComponentBox:
         middle = (self._low + self._high) / 2
         norm = np.linalg.norm(middle, axis=1, keepdims=True)
         if np.any(norm < 1e-9):
-            raise InputError(f"Box {int(np.argmin(norm))} is centred at zero; it says nothing about a direction. Drop it.")
+            raise InputError(
+                f"Box {int(np.argmin(norm))} is centred at zero; it says nothing about a direction. Drop it."
+            )
         return np.asarray(middle / norm)
 
     def support(self, row: int, u: ArrayLike) -> float:
@@ -141,7 +141,7 @@ class ComponentBox:
         return max(values, default=-np.inf)
 
     def cone_angles(self) -> Array:
-        """Return the half angle (m,) [rad] of the cone about each normalised midpoint that holds the box's unit vectors."""
+        """Return the half angle (m,) [rad] of the cone about each midpoint that holds the box's unit vectors."""
         centre = self.midpoint_directions()
         lowest = [-self.support(row, -centre[row]) for row in range(len(self))]
         return np.arccos(np.clip(np.array(lowest) - _OUTWARD, -1.0, 1.0))
@@ -165,7 +165,8 @@ def box_constraints(
     """Return directions, cone bounds and half-space cuts that hold whatever the boxes, cones and cuts together allow.
 
     Each box gives a cone about its midpoint and up to six face cuts
-    e_k . A c_r <= cos(max(0, arccos h_B(e_k) - delta_r)), and the mirror for reference boxes (spherical triangle inequality).
+    e_k . A c_r <= cos(max(0, arccos h_B(e_k) - delta_r)), and the mirror for reference boxes (spherical triangle
+    inequality).
 
     Raises
     ------
@@ -173,7 +174,9 @@ def box_constraints(
     """
     boxed_b, boxed_r = isinstance(b_B, ComponentBox), isinstance(r_N, ComponentBox)
     if angle_bound_rad is None and not (boxed_b or boxed_r):
-        raise InputError("`angle_bound_rad` is missing: one error bound per vector pair [rad], or component boxes for b_B or r_N.")
+        raise InputError(
+            "`angle_bound_rad` is missing: one error bound per vector pair [rad], or component boxes for b_B or r_N."
+        )
     u, w, c = _checked_cuts(cuts)
     if not (boxed_b or boxed_r):
         return b_B, r_N, angle_bound_rad, u, w, c  # type: ignore[return-value]
@@ -200,11 +203,20 @@ def box_constraints(
         right.append(-faces if mirrored else other[rows])
     total = delta_b + delta_r + extra
     # a cone of pi or more says nothing; it stays as wide as a bound may be
-    return b_mid, r_mid, np.minimum(total, np.nextafter(np.pi, 0)), np.concatenate(left), np.concatenate(right), np.concatenate(level)
+    return (
+        b_mid,
+        r_mid,
+        np.minimum(total, np.nextafter(np.pi, 0)),
+        np.concatenate(left),
+        np.concatenate(right),
+        np.concatenate(level),
+    )
 
 
-def _cutting_faces(box: ComponentBox, centre: Array, delta: Array, other_delta: Array) -> tuple[Array, Array, Array]:
-    """Return row, outward face normal and least angle [rad] between face normal and the other direction, for faces that cut."""
+def _cutting_faces(
+    box: ComponentBox, centre: Array, delta: Array, other_delta: Array
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return row, face normal and least angle [rad] from it to the other direction, for faces that cut."""
     limits = np.clip(box.face_limits() + _OUTWARD, -1.0, 1.0)
     least = np.maximum(0.0, np.arccos(limits) - other_delta[:, None])
     faces = _faces()

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from optsat.arrays import Array
 from optsat.attitude.davenport import canonical, rotation_matrix, turn
 from optsat.attitude.gibbs_chart import GibbsChart
-from optsat.certificates.attitude_bound import ellipsoid, recentre, sum_about
 from optsat.certificates.attitude_certificate import AttitudeCertificate
 from optsat.certificates.cell_cover import CellCover, proof_slack
 from optsat.certificates.subpaving import Subpaving
@@ -40,7 +40,6 @@ class RefinedEnclosure:
                 q_BN=refined.q_BN,
                 dcm_BN=rotation_matrix(refined.q_BN),
                 bound_rad=refined.bound_rad,
-                ellipsoid_B=self._ellipsoid_about(refined),
                 certificate=refined,
             )
         return Solution(
@@ -51,10 +50,6 @@ class RefinedEnclosure:
             certificate=answer.certificate,
             stats={**stats, "iterations": point.iterations},
         )
-
-    def _ellipsoid_about(self, refined: AttitudeCertificate) -> "np.ndarray | None":
-        """Return the order-1 ellipsoid when the centre did not move, None otherwise: it is stated about q_BN."""
-        return self.first.ellipsoid_B if np.allclose(refined.q_BN, self.first.q_BN, atol=0, rtol=0) else None
 
     def _cells(self, point: Point) -> AttitudeCertificate | None:
         form = self.lower()
@@ -75,12 +70,11 @@ class RefinedEnclosure:
         if "bound_rad" not in point.stats:
             return None
         form = self.lower()
-        levels = (point.iterations - point.iterations // 2, point.iterations // 2)
         paving = Subpaving(
             form.q_BN,
             form.weights,
             form.scale,
-            point.stats.get("levels", levels),
+            point.stats["levels"],
             point.stats["second_BN"],
             point.stats["second_scale"],
             canonical(point.x),
@@ -92,11 +86,12 @@ class RefinedEnclosure:
 
 
 def repaired(
-    chart: GibbsChart, centre: np.ndarray, tau: float, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray
-) -> tuple[float, np.ndarray]:
+    chart: GibbsChart, centre: Array, tau: float, low: Array, high: Array, multipliers: Array
+) -> tuple[float, Array]:
     """Return a level and multipliers whose every cell is proven with rounding allowed for; inf when that failed.
 
-    An interior-point dual is not exactly feasible: what a cell lacks is put on the multiplier of the unit ball, whose block is
+    An interior-point dual is not exactly feasible: what a cell lacks is put on the multiplier of the unit ball,
+    whose block is
     positive definite, and what that costs in the corner is paid by the level.
     """
     multipliers = np.array(multipliers)

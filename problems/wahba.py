@@ -36,7 +36,8 @@ class WahbaAttitude:
     b_B: Array = field(repr=False)
 
     def covariance_B(self, sigma_rad: ArrayLike) -> Array:
-        """Return the covariance (3, 3) [rad^2] of the attitude error in B for direction noise of sigma_rad per axis (m,).
+        """Return the covariance (3, 3) [rad^2] of the attitude error in B for direction noise of sigma_rad per axis
+        (m,).
 
         Raises
         ------
@@ -73,7 +74,8 @@ class Wahba:
     def interpret(self, point: Point, solver: str) -> Solution[WahbaAttitude]:
         """Return the attitude with its distance from the optimum recomputed from the vectors.
 
-        Proof GLOBAL: the Newton step vanishes and the Hessian is positive (a strict local minimum of Wahba's loss is global) or
+        Proof GLOBAL: the Newton step vanishes and the Hessian is positive (a strict local minimum of Wahba's loss is
+        global) or
         flat; STATIONARY: the step vanishes elsewhere; FEASIBLE: a rotation that is not the optimum.
         """
         b, r, w = self.form.b_B, self.form.r_N, self.form.weights

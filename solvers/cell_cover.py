@@ -1,4 +1,4 @@
-"""Adaptive cells: one small semidefinite programme a cell, the worst cell is halved until the bound meets sampled points."""
+"""Adaptive cells: a small semidefinite programme each; the worst is halved until the bound meets samples."""
 
 import heapq
 from dataclasses import dataclass, field
@@ -75,9 +75,7 @@ class CellCoverSolver:
             },
         )
 
-    def _bound(
-        self, chart: GibbsChart, centre: Array, target: float, low: Array, high: Array
-    ) -> tuple[float, Array]:
+    def _bound(self, chart: GibbsChart, centre: Array, target: float, low: Array, high: Array) -> tuple[float, Array]:
         """Minimise tau >= target over y >= 0 with tau D - N - sum y_j Q_j >= 0."""
         N, D = ball_matrices(centre, chart.scale)
         Q = np.concatenate((chart.matrices(), slab_matrices(low, high)))
@@ -93,12 +91,7 @@ class CellCoverSolver:
         cones: tuple[tuple[ConeKind, int], ...] = (("nonnegative", count + 1), ("psd_triangle", 4))
         point = self.conic.run(ConicForm(q, A, b, cones))
         corners = np.array(
-            [
-                [(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]]
-                for i in (0, 1)
-                for j in (0, 1)
-                for k in (0, 1)
-            ]
+            [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
         )
         farthest = float(np.max(ball_levels(corners, centre, chart.scale)))
         if np.all(np.isfinite(point.x)) and point.x[0] < farthest:
@@ -110,7 +103,10 @@ class CellCoverSolver:
 
 
 def sampled_ball(chart: GibbsChart, rays: int) -> tuple[Array, float]:
-    """Return a centre (chart point) and the largest level of sampled boundary points; the pivot and 0 when none was found."""
+    """Return a centre (chart point) and the largest level of sampled boundary points.
+
+    The pivot and 0 when none was found.
+    """
     inside = interior_point(chart)
     if inside is None:
         return np.zeros(3), 0.0

@@ -36,9 +36,11 @@ def _sparse() -> Any:
 
 @dataclass(frozen=True)
 class Clarabel:
-    """Interior-point conic solver. `dual` is also filled when the problem is infeasible: then it is the ray of the proof.
+    """Interior-point conic solver. `dual` is also filled when the problem is infeasible: then it is the ray of the
+    proof.
 
-    max_iterations : iteration limit; tolerance : gap and feasibility tolerance of the solver (an accuracy is proven elsewhere)
+    max_iterations : iteration limit; tolerance : gap and feasibility tolerance of the solver (an accuracy is proven
+    elsewhere)
     Source: Goulart & Chen, Clarabel.
     """
 

@@ -12,7 +12,8 @@ from optsat.solvers.alignment_point import alignment_point
 class Davenport:
     """Top eigenvector of K, refined by Newton steps in the basis of the heaviest vector.
 
-    No assumption on lengths or on the largest eigenvalue. Source: Davenport (1968); heavy weights: attitude problem depot, section 4.
+    No assumption on lengths or on the largest eigenvalue. Source: Davenport (1968); heavy weights: attitude problem
+    depot, section 4.
     """
 
     name: str = "davenport"

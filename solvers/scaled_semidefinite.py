@@ -1,6 +1,7 @@
 """Smallest provable ball around an admissible set: the 4x4 semidefinite programme, scaled about a pivot attitude.
 
-With 1 - cos(eps) near 1e-9 the plain programme loses its digits; in Gibbs coordinates about a pivot, divided by the pivot's
+With 1 - cos(eps) near 1e-9 the plain programme loses its digits; in Gibbs coordinates about a pivot, divided by the
+pivot's
 own radius, every number is of order one.
 """
 
@@ -24,7 +25,7 @@ _LARGEST_SCALE = np.tan(np.pi / 3)
 class ScaledSemidefinite:
     """Optimal weights by the scaled dual of min t, t I >= X >= 0, tr X = 1, tr(M_j X) >= 0.
 
-    passes : how often the pivot is renewed at the weights found; the second changes the bound by less than 1e-4
+    passes : the pivot is renewed at the weights found while that shrinks its ball to less than 0.3, this often at most
     Source: robust Wahba specification section 6, Theorem 2 and the scaled programme.
     """
 
@@ -41,20 +42,23 @@ class ScaledSemidefinite:
         assert isinstance(form, EnclosureForm)
         admissible = form.admissible
         weights = pivot_weights(admissible) if start is None else start.dual
-        candidates, iterations, last = [weights], 0, None
+        chart, candidates, iterations = _pivot_chart(admissible, weights), [weights], 0
         for _ in range(self.passes):
-            last, found = _solve_about(_pivot_chart(admissible, weights), self.conic)
+            last, found = _solve_about(chart, self.conic)
             iterations += last.iterations
             if found is None:
                 break
-            weights = found
+            weights, former = found, chart.scale
             candidates.append(weights)
+            chart = _pivot_chart(admissible, weights)
+            if last.termination is Termination.CONVERGED and 0.3 * former < chart.scale < _LARGEST_SCALE:
+                break
         return Point(
-            x=dominant_quaternion(davenport_matrix(admissible.left_B, admissible.right_N, weights)),
+            x=chart.q_BN,
             dual=weights,
-            termination=Termination.NUMERICAL_ERROR if last is None else last.termination,
+            termination=last.termination,
             iterations=iterations,
-            stats={"candidates": tuple(candidates), "status": "" if last is None else last.stats["status"]},
+            stats={"candidates": tuple(candidates), "status": last.stats["status"]},
         )
 
 
@@ -97,9 +101,7 @@ def _active(chart: GibbsChart) -> Array:
     # a constraint that holds on the whole unit ball can only have multiplier 0
     if chart.scale >= _LARGEST_SCALE or len(chart.a) <= 8:
         return np.ones(len(chart.a), dtype=bool)
-    lowest = (
-        chart.a - 2 * np.linalg.norm(chart.h, axis=1) + np.minimum(np.linalg.eigvalsh(chart.G)[:, 0], 0.0)
-    )
+    lowest = chart.a - 2 * np.linalg.norm(chart.h, axis=1) + np.minimum(np.linalg.eigvalsh(chart.G)[:, 0], 0.0)
     return np.asarray(lowest <= 0.0)
 
 

@@ -45,6 +45,7 @@ class SubpavingSolver:
             termination=Termination.CONVERGED,
             iterations=sum(self.levels),
             stats={
+                "levels": self.levels,
                 "second_BN": second,
                 "second_scale": second_scale,
                 "bound_rad": float(2 * np.arctan(chart.scale * np.sqrt(level))),
@@ -57,5 +58,5 @@ def _centre(chart: GibbsChart, centres: Array, half: float) -> Array:
     corners = (centres[:, None, :] + half * CORNERS).reshape(-1, 3)
     if len(corners) > 4000:
         # only outer corners shape the ball: keep the extreme one along each of many directions
-        corners = corners[np.unique(np.argmax(corners @ fibonacci_directions(1024).T, axis=0))]
+        corners = corners[np.unique(np.argmax(fibonacci_directions(512) @ corners.T, axis=1))]
     return smallest_ball(corners, chart.scale)

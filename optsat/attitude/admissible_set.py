@@ -100,7 +100,10 @@ class AdmissibleSet:
         return np.asarray(np.abs(separation(self.b_B) - separation(self.r_N)))
 
     def inconsistent_pairs(self, slack_rad: float = 1e-12) -> tuple[tuple[int, int], ...]:
-        """Return the pairs (i, j), i < j, of cones whose mismatch exceeds eps_i + eps_j + slack: a proof that no attitude fits."""
+        """Return the pairs (i, j), i < j, of cones whose mismatch exceeds eps_i + eps_j + slack.
+
+        A proof that no attitude fits.
+        """
         allowed = self.angle_bound_rad[:, None] + self.angle_bound_rad[None, :] + slack_rad
         i, j = np.nonzero(np.triu(self.mismatch_rad() > allowed, 1))
         return tuple(zip(i.tolist(), j.tolist(), strict=True))

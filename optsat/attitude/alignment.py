@@ -1,6 +1,7 @@
 """Wahba's loss near an attitude, evaluated from the vectors so that weight ratios of 1e16 lose nothing.
 
-Eigenvectors of K and singular vectors of B lose the lighter vectors when the gap of K falls below rounding; the gradient
+Eigenvectors of K and singular vectors of B lose the lighter vectors when the gap of K falls below rounding; the
+gradient
 and Hessian formed here, in a body basis whose first axis is the heaviest vector, do not.
 """
 
@@ -8,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optsat.arrays import Array
+from optsat.arrays import Array, cross_rows
 from optsat.attitude.davenport import rotation_matrix, turn
 
 _UNIT_ROUNDOFF = 2.0**-53
@@ -18,8 +19,10 @@ _UNIT_ROUNDOFF = 2.0**-53
 class Curvature:
     """Second-order picture of Wahba's loss at an attitude.
 
-    step : (3,) Newton step (Gauss-Newton where the Hessian is not positive), Gibbs vector in B axes [-]; NaN at a flat optimum
-    sharpness : least eigenvalue of the diagonally scaled Hessian over its own rounding error; > 1 proves a strict minimum
+    step : (3,) Newton step (Gauss-Newton where the Hessian is not positive), Gibbs vector in B axes [-]; NaN at a
+    flat optimum
+    sharpness : least eigenvalue of the diagonally scaled Hessian over its own rounding error; > 1 proves a strict
+    minimum
     free_axes_B : (k, 3) rotation axes along which the loss is flat to rounding, k = 0 at a strict minimum
     gradient : (3,) of the loss along the basis axes, relative to the square root of the Hessian's diagonal
     amplification : radians of answer per radian of data error, an upper estimate [-]
@@ -37,22 +40,24 @@ def heaviest_first_basis(b_B: Array, weights: Array) -> Array:
     first = b_B[int(np.argmax(weights))]
     helper = np.zeros(3)
     helper[int(np.argmin(np.abs(first)))] = 1.0
-    second = np.cross(first, helper)
+    second = cross_rows(first, helper)
     second /= np.linalg.norm(second)
-    return np.stack((first, second, np.cross(first, second)))
+    return np.stack((first, second, cross_rows(first, second)))
 
 
 def curvature(b_B: Array, r_N: Array, weights: Array, q_BN: Array) -> Curvature:
     """Return gradient, Hessian and Newton step of Wahba's loss at q_BN.
 
-    Loss along [g; 1] (x) q: const - 2 g.sum w (b x y) + g^T H g + ..., H = sum w [2 (b.y) I - b y^T - y b^T], y = A(q) r;
+    Loss along [g; 1] (x) q: const - 2 g.sum w (b x y) + g^T H g + ..., H = sum w [2 (b.y) I - b y^T - y b^T], y =
+    A(q) r;
     entries as (b x e_i).(y x e_j) + (y x e_i).(b x e_j), free of cancellation for vectors near an axis.
     """
     y = r_N @ rotation_matrix(q_BN).T
     basis = heaviest_first_basis(b_B, weights)
-    b_cross = np.cross(b_B[:, None, :], basis[None, :, :])
-    y_cross = np.cross(y[:, None, :], basis[None, :, :])
-    # b . (b x e) = 0, so y - b may stand for y: the rounding of a nearly parallel cross product then meets a small vector
+    b_cross = cross_rows(b_B[:, None, :], basis[None, :, :])
+    y_cross = cross_rows(y[:, None, :], basis[None, :, :])
+    # b . (b x e) = 0, so y - b may stand for y: the rounding of a nearly parallel cross product then meets a small
+    # vector
     gradient = -np.einsum("m,mic,mc->i", weights, b_cross, y - b_B)
     product = np.einsum("m,mic,mjc->ij", weights, b_cross, y_cross)
     hessian = product + product.T
@@ -96,7 +101,8 @@ def _scaled_eigen(matrix: Array, noise: Array) -> tuple[Array, Array, Array]:
 def polish(b_B: Array, r_N: Array, weights: Array, q_BN: Array, steps: int = 20) -> tuple[Array, Curvature]:
     """Return q_BN refined by Newton steps on Wahba's loss, and the curvature there.
 
-    A strict local minimum of Wahba's loss is its global minimum (stationary points are the eigenvectors of K), so a Hessian
+    A strict local minimum of Wahba's loss is its global minimum (stationary points are the eigenvectors of K), so a
+    Hessian
     that is positive beyond its rounding error proves the answer.
     """
     here = curvature(b_B, r_N, weights, q_BN)
@@ -127,7 +133,7 @@ def starting_weights(weights: Array) -> Array:
 
 
 def smallest_rotation(q_BN: Array, free_axes_B: Array) -> Array:
-    """Return the quaternion of smallest rotation angle in the optimal set spanned by q_BN turned about the free axes."""
+    """Return the smallest rotation in the optimal set spanned by q_BN and its turns about the free axes."""
     tangent = [_tangent(q_BN, axis) for axis in free_axes_B]
     span = np.linalg.qr(np.stack([q_BN, *tangent]).T)[0]
     projected = span @ span[3]
@@ -137,4 +143,4 @@ def smallest_rotation(q_BN: Array, free_axes_B: Array) -> Array:
 
 def _tangent(q_BN: Array, axis_B: Array) -> Array:
     v, s = q_BN[:3], q_BN[3]
-    return np.concatenate((s * axis_B - np.cross(axis_B, v), [-float(axis_B @ v)]))
+    return np.concatenate((s * axis_B - cross_rows(axis_B, v), [-float(axis_B @ v)]))

@@ -8,9 +8,11 @@ from optsat.errors import InputError
 
 
 def attitude_covariance(b_B: Array, weights: Array, sigma_rad: ArrayLike) -> Array:
-    """Return the covariance (3, 3) [rad^2] in B of the Wahba attitude with weights (m,) under independent direction noise.
+    """Return the covariance (3, 3) [rad^2] in B of the Wahba attitude with weights (m,) under independent direction
+    noise.
 
-    P = H^-1 (sum w^2 sigma^2 (I - b b^T)) H^-1, H = sum w (I - b b^T); equals (sum (I - b b^T) / sigma^2)^-1 at w = 1 / sigma^2.
+    P = H^-1 (sum w^2 sigma^2 (I - b b^T)) H^-1, H = sum w (I - b b^T); equals (sum (I - b b^T) / sigma^2)^-1 at w =
+    1 / sigma^2.
 
     b_B : (m, 3) unit; sigma_rad : (m,) or scalar, standard deviation of each direction per tangent axis [rad]
 
@@ -35,7 +37,8 @@ def attitude_covariance(b_B: Array, weights: Array, sigma_rad: ArrayLike) -> Arr
     if float(np.linalg.eigvalsh(information)[0]) < 1e-15:
         raise InputError(
             "The covariance does not exist: the weighted directions are collinear, so the rotation about "
-            f"{np.array2string(b_B[int(np.argmax(weights))], precision=6)} in B is undetermined. Add a direction off that axis."
+            f"{np.array2string(b_B[int(np.argmax(weights))], precision=6)} in B is undetermined. Add "
+            "a direction off that axis."
         )
     spread = np.einsum("m,mij->ij", (weights * sigma) ** 2, tangent)
     inverse = np.linalg.inv(information)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from optsat.arrays import Array
+from optsat.arrays import Array, cross_rows
 from optsat.attitude import dcm, quaternion
 from optsat.attitude.edges import unchecked
 
@@ -23,9 +23,7 @@ def davenport_matrix(b_B: Array, r_N: Array, weights: Array) -> Array:
     trace = np.trace(B, axis1=-2, axis2=-1)
     K = np.empty((*B.shape[:-2], 4, 4))
     K[..., :3, :3] = B + np.swapaxes(B, -1, -2) - trace[..., None, None] * np.eye(3)
-    z = np.stack(
-        (B[..., 1, 2] - B[..., 2, 1], B[..., 2, 0] - B[..., 0, 2], B[..., 0, 1] - B[..., 1, 0]), axis=-1
-    )
+    z = np.stack((B[..., 1, 2] - B[..., 2, 1], B[..., 2, 0] - B[..., 0, 2], B[..., 0, 1] - B[..., 1, 0]), axis=-1)
     K[..., :3, 3] = z
     K[..., 3, :3] = z
     K[..., 3, 3] = trace
@@ -49,20 +47,22 @@ def turn(q_BN: Array, gibbs: Array) -> Array:
     """
     v, s = q_BN[..., :3], q_BN[..., 3:]
     turned = np.concatenate(
-        (v + s * gibbs - np.cross(gibbs, v), s - np.sum(gibbs * v, axis=-1, keepdims=True)), axis=-1
+        (v + s * gibbs - cross_rows(gibbs, v), s - np.sum(gibbs * v, axis=-1, keepdims=True)), axis=-1
     )
     return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
 
 
 def centred_blocks(u_B: Array, y_B: Array, level: Array) -> tuple[Array, Array]:
-    """Return the first row's vector part and the 3x3 block of K(u, w) - level I in (1, g) coordinates about an attitude.
+    """Return the first row's vector part and the 3x3 block of K(u, w) - level I in (1, g) coordinates about an
+    attitude.
 
     With y = A(q) w and q' = [g; 1] (x) q, unnormalised:
     q'^T (K(u, w) - level I) q' = (u.y - level) + 2 g.(u x y) + g^T [u y^T + y u^T - (u.y + level) I] g.
 
-    u_B, y_B : (..., m, 3); level : (..., m). The scalar entry is left to the caller, who knows a form without cancellation.
+    u_B, y_B : (..., m, 3); level : (..., m). The scalar entry is left to the caller, who knows a form without
+    cancellation.
     """
-    linear = np.cross(u_B, y_B)
+    linear = cross_rows(u_B, y_B)
     outer = u_B[..., :, None] * y_B[..., None, :]
     dot = np.sum(u_B * y_B, axis=-1)
     block = outer + np.swapaxes(outer, -1, -2) - (dot + level)[..., None, None] * np.eye(3)

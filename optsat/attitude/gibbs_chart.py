@@ -1,15 +1,17 @@
 """Gibbs chart: attitudes [s g; 1] (x) q about a pivot q, with the radius of interest scaled to |g| = 1.
 
-In this chart every constraint is a quadratic f(g) = a + 2 h.g + g^T G g and every number is of order one, whatever the size
+In this chart every constraint is a quadratic f(g) = a + 2 h.g + g^T G g and every number is of order one, whatever
+the size
 of the errors. A ball about the attitude at g = c is {g : N(g) <= tau D(g)} with tan^2(theta / 2) = s^2 tau,
-N(g) = |g - c|^2 + s^2 (|g|^2 |c|^2 - (g.c)^2), D(g) = (1 + s^2 g.c)^2. The chart is gnomonic: a ball below pi is convex in it.
+N(g) = |g - c|^2 + s^2 (|g|^2 |c|^2 - (g.c)^2), D(g) = (1 + s^2 g.c)^2. The chart is gnomonic: a ball below pi is
+convex in it.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from optsat.arrays import Array
+from optsat.arrays import Array, cross_rows
 from optsat.attitude.admissible_set import AdmissibleSet
 from optsat.attitude.davenport import turn
 
@@ -41,7 +43,8 @@ class GibbsChart:
         size = np.maximum(np.maximum(np.abs(a), np.abs(h).max(axis=1)), np.abs(G).max(axis=(1, 2)))
         size = np.maximum(size, np.finfo(float).tiny)
         m = admissible.cone_count
-        # a cone's a is a difference of squares of size eps^2, its h carries the rounding of y, a cut's a has its full size
+        # a cone's a is a difference of squares of size eps^2, its h carries the rounding of y, a cut's a has its
+        # full size
         cones = np.sqrt(2 * admissible.cone_versine) + np.linalg.norm(h[:m], axis=1) + scale + ROUNDOFF
         noise = 40 * ROUNDOFF * np.concatenate((cones, admissible.magnitude[m:])) / size
         return GibbsChart(
@@ -89,9 +92,12 @@ def slab_matrices(low: Array, high: Array) -> Array:
 
 
 def ball_levels(g: Array, centre: Array, scale: float) -> Array:
-    """Return tau (...) of chart points g (..., 3): tan^2(theta / 2) / s^2 of their angle theta from `centre`; inf beyond pi."""
+    """Return tau (...) of chart points g (..., 3): tan^2(theta / 2) / s^2 of their angle theta from `centre`.
+
+    Inf beyond pi.
+    """
     gap = g - centre
-    N = np.sum(gap * gap, axis=-1) + scale**2 * np.sum(np.cross(g, centre) ** 2, axis=-1)
+    N = np.sum(gap * gap, axis=-1) + scale**2 * np.sum(cross_rows(g, centre) ** 2, axis=-1)
     root = 1 + scale**2 * (g @ centre)
     return np.where(root > 0, N / np.maximum(root, 1e-300) ** 2, np.inf)
 

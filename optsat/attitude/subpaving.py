@@ -1,6 +1,7 @@
 """Subpaving: cells of a Gibbs chart that no constraint excludes; they hold the admissible set and show its shape.
 
-A cell is dropped only when some constraint is negative on all of it: f(centre) + h |grad f|_1 + h^2 sum |G| < -rounding.
+A cell is dropped only when some constraint is negative on all of it: f(centre) + h |grad f|_1 + h^2 sum |G| <
+-rounding.
 The procedure has no choice in it, so running it again is its own check.
 """
 
@@ -37,9 +38,7 @@ def farthest_level(chart: GibbsChart, centres: Array, half: float, centre: Array
     """Return the largest ball level over all corners of the cells, seen from chart point `centre`."""
     worst = 0.0
     for corner in CORNERS:
-        worst = max(
-            worst, float(np.max(ball_levels(centres + half * corner, centre, chart.scale), initial=0.0))
-        )
+        worst = max(worst, float(np.max(ball_levels(centres + half * corner, centre, chart.scale), initial=0.0)))
     return worst * (1 + 1e-12)
 
 

@@ -3,9 +3,11 @@
 All functions take (..., 2, 3) unit vectors and work on whole arrays at once.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from optsat.arrays import Array
+from optsat.arrays import Array, cross_rows
 
 _GOLDEN = (np.sqrt(5.0) - 1) / 2
 _STEPS = 24
@@ -28,8 +30,8 @@ def wahba_dcm(b_B: Array, r_N: Array, weights: Array) -> Array:
     weights : (..., 2), sum 1. Collinear pairs give NaN: the caller decides before.
     Source: robust attitude paper, two-vector form; Markley (2002), fast attitude from two vectors.
     """
-    b3 = np.cross(b_B[..., 0, :], b_B[..., 1, :])
-    r3 = np.cross(r_N[..., 0, :], r_N[..., 1, :])
+    b3 = cross_rows(b_B[..., 0, :], b_B[..., 1, :])
+    r3 = cross_rows(r_N[..., 0, :], r_N[..., 1, :])
     with np.errstate(invalid="ignore", divide="ignore"):
         b3 = b3 / np.linalg.norm(b3, axis=-1, keepdims=True)
         r3 = r3 / np.linalg.norm(r3, axis=-1, keepdims=True)
@@ -39,24 +41,52 @@ def wahba_dcm(b_B: Array, r_N: Array, weights: Array) -> Array:
         for k, share in ((0, w / p), (1, v / p)):
             b, r = b_B[..., k, :], r_N[..., k, :]
             plane = (
-                b[..., :, None] * r[..., None, :]
-                + np.cross(b, b3)[..., :, None] * np.cross(r, r3)[..., None, :]
+                b[..., :, None] * r[..., None, :] + cross_rows(b, b3)[..., :, None] * cross_rows(r, r3)[..., None, :]
             )
             A = A + share[..., None, None] * plane
     return np.asarray(A)
 
 
-def squared_sine_bound(x: Array, versine: Array, theta_b: Array, theta_r: Array) -> Array:
-    """Return rho(x) = sin^2(bound / 2) (...) at the log weight ratio x = log(w / v), without cancellation.
+@dataclass(frozen=True)
+class BoundOfWeights:
+    """Guaranteed bound of two pairs as a function of the log weight ratio x = log(w / v); arrays of poses (...).
 
-    versine : (..., 2) 1 - cos(eps). Source: Theorem 1 for N = 2, robust Wahba specification section 6.
+    rho(x) = [h1/v + h2/w - 4 sin^2((theta_b - theta_r)/2) / (p + 1)] (p + m) / (4 sin theta_b sin theta_r),
+    p, m = sqrt(w^2 + v^2 + 2 w v cos(theta_b -+ theta_r)), h = 1 - cos(eps); no cancellation down to arcseconds.
+    Source: Theorem 1 for two vectors, robust Wahba specification section 6.
     """
-    w, v = 1 / (1 + np.exp(-x)), 1 / (1 + np.exp(x))
-    difference, total = theta_b - theta_r, theta_b + theta_r
-    p = np.sqrt(w * w + v * v + 2 * w * v * np.cos(difference))
-    m = np.sqrt(w * w + v * v + 2 * w * v * np.cos(total))
-    numerator = versine[..., 0] / v + versine[..., 1] / w - 4 * np.sin(difference / 2) ** 2 / (p + 1)
-    return np.asarray(numerator * (p + m) / (4 * np.sin(theta_b) * np.sin(theta_r)))
+
+    versine: tuple[Array, Array]
+    cosine_difference: Array
+    cosine_sum: Array
+    mismatch: Array
+    scale: Array
+
+    @staticmethod
+    def of(theta_b: Array, theta_r: Array, angle_bound_rad: Array) -> "BoundOfWeights":
+        """Return the function for pair angles (...) and bounds (..., 2) [rad]."""
+        half = np.sin(angle_bound_rad / 2)
+        with np.errstate(divide="ignore"):
+            scale = 1 / (4 * np.sin(theta_b) * np.sin(theta_r))
+        return BoundOfWeights(
+            (2 * half[..., 0] ** 2, 2 * half[..., 1] ** 2),
+            2 * np.cos(theta_b - theta_r),
+            2 * np.cos(theta_b + theta_r),
+            4 * np.sin((theta_b - theta_r) / 2) ** 2,
+            scale,
+        )
+
+    def __call__(self, x: Array) -> Array:
+        """Return rho = sin^2(bound / 2) (...); >= 1 means unbounded, < 0 inconsistent."""
+        tail = np.exp(-x)
+        w = 1 / (1 + tail)
+        v = tail * w
+        squares, product = w * w + v * v, w * v
+        p = np.sqrt(squares + product * self.cosine_difference)
+        m = np.sqrt(np.maximum(squares + product * self.cosine_sum, 0.0))
+        # 1/v and 1/w from their own exponential: nothing is 0/0 at either end
+        pull = self.versine[0] * (1 + 1 / tail) + self.versine[1] * (1 + tail)
+        return np.asarray((pull - self.mismatch / (p + 1)) * (p + m) * self.scale)
 
 
 def best_weights(b_B: Array, r_N: Array, angle_bound_rad: Array) -> Array:
@@ -67,23 +97,19 @@ def best_weights(b_B: Array, r_N: Array, angle_bound_rad: Array) -> Array:
     """
     half = np.sin(angle_bound_rad / 2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        end = np.log(half[..., 1]) - np.log(half[..., 0])
-    end = np.clip(
-        np.nan_to_num(end, nan=0.0, posinf=_LOG_RATIO_LIMIT, neginf=-_LOG_RATIO_LIMIT),
-        -_LOG_RATIO_LIMIT,
-        _LOG_RATIO_LIMIT,
-    )
-    theta_b, theta_r = pair_angle(b_B), pair_angle(r_N)
-    versine = 2 * half**2
+        end = np.nan_to_num(np.log(half[..., 1]) - np.log(half[..., 0]), nan=0.0)
+    end = np.clip(end, -_LOG_RATIO_LIMIT, _LOG_RATIO_LIMIT)
+    rho = BoundOfWeights.of(pair_angle(b_B), pair_angle(r_N), angle_bound_rad)
     low, high = np.minimum(end, 0.0), np.maximum(end, 0.0)
-    x1, x2 = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    width = high - low
+    x1, x2 = high - _GOLDEN * width, low + _GOLDEN * width
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        f1, f2 = (squared_sine_bound(x, versine, theta_b, theta_r) for x in (x1, x2))
+        f1, f2 = rho(x1), rho(x2)
         for _ in range(_STEPS):
             left = f1 <= f2
-            high, low = np.where(left, x2, high), np.where(left, low, x1)
-            probe = np.where(left, high - _GOLDEN * (high - low), low + _GOLDEN * (high - low))
-            value = squared_sine_bound(probe, versine, theta_b, theta_r)
+            low, width = np.where(left, low, x1), width * _GOLDEN
+            probe = low + np.where(left, 1 - _GOLDEN, _GOLDEN) * width
+            value = rho(probe)
             x1, x2 = np.where(left, probe, x2), np.where(left, x1, probe)
             f1, f2 = np.where(left, value, f2), np.where(left, f1, value)
     x = np.where(f1 <= f2, x1, x2)
@@ -93,6 +119,6 @@ def best_weights(b_B: Array, r_N: Array, angle_bound_rad: Array) -> Array:
 def collinear(b_B: Array, r_N: Array, tolerance: float = 1e-12) -> Array:
     """Return whether either pair of directions (..., 2, 3) spans no plane: sine of its angle <= tolerance."""
     return np.asarray(
-        (np.linalg.norm(np.cross(b_B[..., 0, :], b_B[..., 1, :]), axis=-1) <= tolerance)
-        | (np.linalg.norm(np.cross(r_N[..., 0, :], r_N[..., 1, :]), axis=-1) <= tolerance)
+        (np.linalg.norm(cross_rows(b_B[..., 0, :], b_B[..., 1, :]), axis=-1) <= tolerance)
+        | (np.linalg.norm(cross_rows(r_N[..., 0, :], r_N[..., 1, :]), axis=-1) <= tolerance)
     )

@@ -1,6 +1,7 @@
 """Two-eigenvalue bound: every admissible attitude lies in a ball about q, for any weights, rounding allowed for.
 
-Theorem 1 of the robust Wahba specification (section 6): with f(g) = a + 2 h.g - g^T C g the weighted sum of the constraints
+Theorem 1 of the robust Wahba specification (section 6): with f(g) = a + 2 h.g - g^T C g the weighted sum of the
+constraints
 about q, f >= 0 for every admissible attitude [g; 1] (x) q, hence |g|^2 <= s1 / -s2 with s1 >= a + |h|^2 / mu and
 s2 <= mu - lambda_min(C) for every mu > 0.
 """
@@ -116,16 +117,24 @@ def recentre(total: WeightedSum) -> Array:
     return turn(total.q_BN, np.where(bounded[..., None], step, 0.0))
 
 
-def enclose(admissible: AdmissibleSet, weights: Array, recentrings: int = 2) -> Ball:
-    """Return the ball about the Davenport attitude of the given weights (count,) >= 0, which need not be normalised.
+def best_centre(admissible: AdmissibleSet, weights: Array, recentrings: int = 1) -> Array:
+    """Return the attitude (4,) about which the given weights (count,), sum 1, prove the smallest ball.
+
+    The Davenport attitude of the weights, finished by Newton steps on the vectors.
+    """
+    q_BN = dominant_quaternion(davenport_matrix(admissible.left_B, admissible.right_N, weights))
+    for _ in range(recentrings):
+        q_BN = recentre(sum_about(admissible, weights, q_BN))
+    return q_BN
+
+
+def enclose(admissible: AdmissibleSet, weights: Array) -> Ball:
+    """Return the smallest ball that the given weights (count,) >= 0, any scale, prove.
 
     Source: robust Wahba specification, Theorem 1 with its rounding-safe evaluation.
     """
     weights = weights / weights.sum()
-    q_BN = dominant_quaternion(davenport_matrix(admissible.left_B, admissible.right_N, weights))
-    for _ in range(recentrings):
-        q_BN = recentre(sum_about(admissible, weights, q_BN))
-    return ball_of(sum_about(admissible, weights, q_BN))
+    return ball_of(sum_about(admissible, weights, best_centre(admissible, weights)))
 
 
 def sum_about(admissible: AdmissibleSet, weights: Array, q_BN: Array) -> WeightedSum:

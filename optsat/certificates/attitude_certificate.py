@@ -8,6 +8,7 @@ import numpy as np
 
 from optsat.arrays import Array
 from optsat.attitude.admissible_set import AdmissibleSet
+from optsat.attitude.davenport import turn
 from optsat.attitude.status import AttitudeStatus
 from optsat.certificates.attitude_bound import ROUNDOFF, Ball, ball_of, sum_about
 from optsat.certificates.cell_cover import CellCover
@@ -106,18 +107,13 @@ class AttitudeCertificate:
             excess = self._pair_excess()
             return Verdict(excess > 0, f"mismatch of pairs {self.pair} beyond their bounds: {excess:.6g} rad")
         ball = self.ball()
-        return Verdict(
-            bool(ball.empty), f"s1 = {float(ball.s1):.6g}, s2 = {float(ball.s2):.6g}; both must be negative"
-        )
+        return Verdict(bool(ball.empty), f"s1 = {float(ball.s1):.6g}, s2 = {float(ball.s2):.6g}; both must be negative")
 
     def _verify_refinement(self, refinement: CellCover | Subpaving) -> Verdict:
         if not self.bound_rad >= refinement.bound_rad * (1 - 1e-10):
             return Verdict(False, "the claimed bound is below that of the refinement")
-        if isinstance(refinement, CellCover):
-            chart_q = _cover_centre(refinement)
-        else:
-            chart_q = refinement.centre_BN
-        if 1 - abs(float(chart_q @ self.q_BN)) > 1e-15 + 1e-12 * self.bound_rad**2:
+        centre = _cover_centre(refinement) if isinstance(refinement, CellCover) else refinement.centre_BN
+        if 1 - abs(float(centre @ self.q_BN)) > 1e-15 + 1e-12 * self.bound_rad**2:
             return Verdict(False, "q_BN is not the centre of the refinement")
         return refinement.check(self.admissible)
 
@@ -192,8 +188,6 @@ class AttitudeCertificate:
 
 
 def _cover_centre(cover: CellCover) -> Array:
-    from optsat.attitude.davenport import turn
-
     return turn(cover.pivot_BN, cover.scale * cover.centre)
 
 
@@ -252,9 +246,7 @@ class _Reader:
     def mapping(self, name: str) -> dict[str, Any]:
         value = self.content.get(name)
         if not isinstance(value, dict):
-            raise CertificateFormatError(
-                f"`{self.prefix}{name}` must be an object, got {type(value).__name__}."
-            )
+            raise CertificateFormatError(f"`{self.prefix}{name}` must be an object, got {type(value).__name__}.")
         return value
 
     def array(self, name: str, shape: tuple[int | None, ...]) -> Array:

@@ -1,8 +1,10 @@
 """Cell cover: a tighter bound than Theorem 1 from one multiplier proof a cell of the pivot ball.
 
-The pivot ball |g| <= 1 of a Gibbs chart holds the admissible set (Theorem 1). Its bounding cube is cut into cells. On a cell,
+The pivot ball |g| <= 1 of a Gibbs chart holds the admissible set (Theorem 1). Its bounding cube is cut into cells.
+On a cell,
 multipliers y >= 0 of the constraints, of the three slabs (g_a - l_a)(u_a - g_a) >= 0 and of 1 - |g|^2 >= 0 prove
-|angle to the centre| <= theta for every admissible attitude in it when tau D - N - sum_j y_j Q_j is positive semidefinite.
+|angle to the centre| <= theta for every admissible attitude in it when tau D - N - sum_j y_j Q_j is positive
+semidefinite.
 """
 
 from dataclasses import dataclass
@@ -21,7 +23,8 @@ def proof_slack(
 ) -> Array:
     """Return the slack (...) of the cells' proofs: smallest eigenvalue less its rounding error, >= 0 when proven.
 
-    low, high : (..., 3); multipliers : (..., n + 4) of the constraints, the slabs and the unit ball; tau : scalar or (...)
+    low, high : (..., 3); multipliers : (..., n + 4) of the constraints, the slabs and the unit ball; tau : scalar or
+    (...)
     """
     N, D = ball_matrices(centre, chart.scale)
     constraints = chart.matrices()
@@ -29,12 +32,7 @@ def proof_slack(
     y, z = multipliers[..., :n], multipliers[..., n:]
     slabs = slab_matrices(low, high)
     level = np.asarray(tau)[..., None, None]
-    proof = (
-        level * D
-        - N
-        - np.einsum("...n,nij->...ij", y, constraints)
-        - np.einsum("...k,...kij->...ij", z, slabs)
-    )
+    proof = level * D - N - np.einsum("...n,nij->...ij", y, constraints) - np.einsum("...k,...kij->...ij", z, slabs)
     terms = np.asarray(np.abs(tau)) * np.abs(D).max() + np.abs(N).max() + y @ np.ones(n) + z.sum(axis=-1)
     rounding = (n + 60) * ROUNDOFF * terms + y @ chart.rounding
     return np.asarray(np.linalg.eigvalsh(proof)[..., 0] - 4 * rounding)
@@ -67,9 +65,7 @@ class CellCover:
         """Recompute the whole proof from the data."""
         chart = GibbsChart.about(admissible, self.pivot_BN, self.scale)
         if not (
-            np.all(self.pivot_weights >= 0)
-            and np.all(self.multipliers >= 0)
-            and np.all(np.isfinite(self.multipliers))
+            np.all(self.pivot_weights >= 0) and np.all(self.multipliers >= 0) and np.all(np.isfinite(self.multipliers))
         ):
             return Verdict(False, "a multiplier is negative or not finite")
         pivot = ball_of(sum_about(admissible, self.pivot_weights / self.pivot_weights.sum(), self.pivot_BN))
@@ -79,9 +75,7 @@ class CellCover:
             return Verdict(False, "the cells do not tile the cube around the pivot ball")
         slack = proof_slack(chart, self.centre, self.tau, self.low, self.high, self.multipliers)
         if not np.all(slack >= 0):
-            return Verdict(
-                False, f"cell {int(np.argmin(slack))} is not proven (slack {float(slack.min()):.3g})"
-            )
+            return Verdict(False, f"cell {int(np.argmin(slack))} is not proven (slack {float(slack.min()):.3g})")
         return Verdict(True, f"{len(self.low)} cells proven")
 
     def margin(self, admissible: AdmissibleSet) -> float:

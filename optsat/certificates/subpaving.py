@@ -17,7 +17,8 @@ class Subpaving:
     """Two rounds of pruning: the pivot ball of Theorem 1, then the ball around what the first round left.
 
     pivot_BN, pivot_weights, scale : first ball; levels : halvings of each round
-    second_BN (4,), second_scale : second ball, None for one round; centre_BN (4,) : centre of the bound; bound_rad [rad]
+    second_BN (4,), second_scale : second ball, None for one round; centre_BN (4,) : centre of the bound; bound_rad
+    [rad]
     """
 
     pivot_BN: Array
@@ -54,7 +55,5 @@ class Subpaving:
         level = farthest_level(chart, centres, half, chart_point(chart, self.centre_BN))
         proven = 2 * np.arctan(chart.scale * np.sqrt(level))
         if proven > self.bound_rad * (1 + 1e-10):
-            return Verdict(
-                False, f"recomputed bound {proven:.12g} rad exceeds the claimed {self.bound_rad:.12g} rad"
-            )
+            return Verdict(False, f"recomputed bound {proven:.12g} rad exceeds the claimed {self.bound_rad:.12g} rad")
         return Verdict(True, f"{len(centres)} cells remain")

@@ -1,0 +1,99 @@
+"""optsat: attitude software that can be trusted in flight, from one symbolic description of a spacecraft.
+
+Importing this package loads NumPy at most; every public name loads its own module on first use.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from optsat._version import __version__
+
+if TYPE_CHECKING:
+    from optsat.attitude.status import AttitudeStatus
+    from optsat.determine import CertifiedBatch, certify_attitude, certify_attitude_batch, wahba
+    from optsat.errors import InputError, NotProvenError, OptsatError, RecordError
+    from optsat.estimators.attitude_series import AttitudeSeries, Window, certify_record
+    from optsat.estimators.isolation import Isolation, isolate
+    from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
+    from optsat.problems.component_box import ComponentBox
+    from optsat.problems.wahba import Wahba, WahbaAttitude
+    from optsat.records.csv_log import read_csv_log, write_csv_log
+    from optsat.records.record import Record, VectorChannel
+    from optsat.solution import Proof, Solution, Termination
+    from optsat.solve import solve
+    from optsat.statistical_bound import statistical_angle_bound
+
+_HOME = {
+    "AttitudeSeries": "optsat.estimators.attitude_series",
+    "AttitudeStatus": "optsat.attitude.status",
+    "CertifiedAttitude": "optsat.problems.certified_attitude",
+    "CertifiedAttitudeProblem": "optsat.problems.certified_attitude",
+    "CertifiedBatch": "optsat.determine",
+    "ComponentBox": "optsat.problems.component_box",
+    "InputError": "optsat.errors",
+    "Isolation": "optsat.estimators.isolation",
+    "NotProvenError": "optsat.errors",
+    "OptsatError": "optsat.errors",
+    "Proof": "optsat.solution",
+    "Record": "optsat.records.record",
+    "RecordError": "optsat.errors",
+    "Solution": "optsat.solution",
+    "Termination": "optsat.solution",
+    "VectorChannel": "optsat.records.record",
+    "Wahba": "optsat.problems.wahba",
+    "WahbaAttitude": "optsat.problems.wahba",
+    "Window": "optsat.estimators.attitude_series",
+    "certify_attitude": "optsat.determine",
+    "certify_attitude_batch": "optsat.determine",
+    "certify_record": "optsat.estimators.attitude_series",
+    "isolate": "optsat.estimators.isolation",
+    "read_csv_log": "optsat.records.csv_log",
+    "solve": "optsat.solve",
+    "statistical_angle_bound": "optsat.statistical_bound",
+    "wahba": "optsat.determine",
+    "write_csv_log": "optsat.records.csv_log",
+}
+
+__all__ = [
+    "AttitudeSeries",
+    "AttitudeStatus",
+    "CertifiedAttitude",
+    "CertifiedAttitudeProblem",
+    "CertifiedBatch",
+    "ComponentBox",
+    "InputError",
+    "Isolation",
+    "NotProvenError",
+    "OptsatError",
+    "Proof",
+    "Record",
+    "RecordError",
+    "Solution",
+    "Termination",
+    "VectorChannel",
+    "Wahba",
+    "WahbaAttitude",
+    "Window",
+    "__version__",
+    "certify_attitude",
+    "certify_attitude_batch",
+    "certify_record",
+    "isolate",
+    "read_csv_log",
+    "solve",
+    "statistical_angle_bound",
+    "wahba",
+    "write_csv_log",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'optsat' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

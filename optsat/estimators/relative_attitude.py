@@ -1,0 +1,93 @@
+"""Relative attitude between epochs from gyro samples, with a bound on its error."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optsat.arrays import Array
+from optsat.attitude import quaternion
+from optsat.attitude.davenport import rotation_matrix
+from optsat.attitude.edges import unchecked
+from optsat.errors import InputError
+from optsat.records.record import Record
+
+_compose = unchecked(quaternion.compose)
+
+
+@dataclass(frozen=True)
+class RelativeAttitude:
+    """Attitude of every epoch relative to the first, and how far its error may have grown.
+
+    q_BkB0 (T, 4) : the product of the steps; growth_rad (T,) : accumulated bound [rad]; segment (T,) : epochs that
+    an unbroken
+    gyro connects share a number
+    """
+
+    q_BkB0: Array
+    growth_rad: Array
+    segment: NDArray[np.int64]
+
+    @staticmethod
+    def of(record: Record) -> "RelativeAttitude":
+        """Return the relative attitudes of a record, the rate taken as linear between samples.
+
+        The growth of a step dt is dt times the larger rate bound plus twice the leading integration error
+        dt^3 (|omega''| / 12 + |omega| |omega'| / 12), its derivatives from differences of the samples: the rate is
+        taken to be
+        smooth between samples, which no log can prove.
+
+        Raises
+        ------
+        InputError : the record holds no gyro or no bound for it.
+        """
+        omega, gyro_bound = record.omega_BN_B, record.gyro_bound_rad_s
+        if omega is None or gyro_bound is None:
+            missing = "gyro rate" if omega is None else "bound of the gyro error"
+            raise InputError(f"A window needs the {missing} in the record; leave out `window` for single frames.")
+        t = record.t
+        dt = np.diff(t)
+        known = np.all(np.isfinite(omega), axis=1) & np.isfinite(gyro_bound)
+        joined = known[:-1] & known[1:]
+        rate = np.where(known[:, None], omega, 0.0)
+        error = np.where(known, gyro_bound, 0.0)
+        step = quaternion.exponential(0.5 * (rate[:-1] + rate[1:]) * dt[:, None])
+        slope = np.linalg.norm(np.diff(rate, axis=0), axis=1) / dt
+        size = np.linalg.norm(rate, axis=1)
+        curve = _second_derivative(rate, t)
+        integration = dt**3 / 12 * (np.maximum(curve[:-1], curve[1:]) + np.maximum(size[:-1], size[1:]) * slope)
+        growth = dt * np.maximum(error[:-1], error[1:]) + 2 * integration
+        total = prefix_products(np.concatenate((np.array([[0.0, 0.0, 0.0, 1.0]]), step)))
+        return RelativeAttitude(
+            total, np.concatenate(([0.0], np.cumsum(growth))), np.concatenate(([0], np.cumsum(~joined)))
+        )
+
+    def connected(self, j: int, k: int) -> bool:
+        """Return whether the gyro is unbroken between epochs j and k."""
+        return bool(self.segment[j] == self.segment[k])
+
+    def rotation(self, j: int, k: int) -> tuple[Array, float]:
+        """Return the rotation (3, 3) from B at epoch j to B at epoch k, and the bound [rad] of its error."""
+        turn = rotation_matrix(self.q_BkB0[k]) @ rotation_matrix(self.q_BkB0[j]).T
+        return turn, float(abs(self.growth_rad[k] - self.growth_rad[j]))
+
+
+def _second_derivative(rate: Array, t: Array) -> Array:
+    """Return |omega''| (T,) by divided differences; the ends repeat their neighbours."""
+    curve = np.zeros(len(t))
+    if len(t) >= 3:
+        slope = np.diff(rate, axis=0) / np.diff(t)[:, None]
+        curve[1:-1] = np.linalg.norm(np.diff(slope, axis=0), axis=1) / (0.5 * (t[2:] - t[:-2]))
+        curve[0], curve[-1] = curve[1], curve[-2]
+    return curve
+
+
+def prefix_products(steps: Array) -> Array:
+    """Return the products steps[k] (x) ... (x) steps[0] (T, 4) in log2 T array passes."""
+    total = np.array(steps)
+    reach = 1
+    while reach < len(total):
+        total[reach:] = _compose(total[reach:], total[:-reach])
+        total /= np.linalg.norm(total, axis=1, keepdims=True)
+        reach *= 2
+    return total

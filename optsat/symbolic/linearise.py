@@ -9,8 +9,8 @@ from optsat.symbolic.port import Port
 def linearise(derivative: GeneratedFunction, states: Sequence[str], inputs: Sequence[str]) -> GeneratedFunction:
     """Return A = d(outputs)/d(states) and B = d(outputs)/d(inputs) as a function of all inputs of `derivative`.
 
-    Outputs, states and inputs are each joined to one column in the given order; matrices are counted by rows. All SI, so
-    an entry carries the unit of its row over that of its column. Serves a rate (continuous) and a step (discrete) alike.
+    Outputs, states and inputs are each joined to one column in the given order; matrices are counted by rows. All SI:
+    an entry carries the unit of its row over that of its column. Serves rates (continuous) and steps (discrete).
 
     Raises
     ------

@@ -30,8 +30,7 @@ def statistical_angle_bound(sigma_rad: ArrayLike, probability: float) -> Array:
     if np.any(bound >= np.pi):
         index = int(np.argmax(bound >= np.pi))
         raise InputError(
-            "`sigma_rad` index {index} is {sigma[index]:g} rad: its bound of {bound[index]:.3g} rad "
-            "says nothing about a "
-            "direction. Is it in degrees? Use numpy.deg2rad."
+            f"`sigma_rad` index {index} is {sigma[index]:g} rad: its bound of {bound[index]:.3g} rad says nothing "
+            "about a direction. Is it in degrees? Use numpy.deg2rad."
         )
     return np.asarray(bound)

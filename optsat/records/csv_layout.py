@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from optsat.errors import InputError, RecordError, nearest_name
 from optsat.records.csv_metadata import Metadata, Mounting, parse_metadata
+from optsat.records.record import RESERVED
 from optsat.units import Kind, kind_of, si_factor
 
 MAGIC = "# optsat-log 1"
@@ -120,9 +121,7 @@ class _HeaderReader:
 
     def check_names(self) -> list[str]:
         """Return the vectors in their order; refuse every other unknown name with the nearest known one."""
-        parts = {
-            name: _VECTOR_PART.fullmatch(name) for name in self.numbers if name.split(".")[0] not in ("gyro", "truth")
-        }
+        parts = {name: _VECTOR_PART.fullmatch(name) for name in self.numbers if name.split(".")[0] not in RESERVED}
         vectors = list(dict.fromkeys(part["vector"] for part in parts.values() if part))
         known = ["t", *_GYRO, "gyro.bound", *_TRUTH]
         for vector in vectors or ["NAME"]:

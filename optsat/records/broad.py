@@ -3,10 +3,11 @@
 N is the benchmark's east-north-up frame, B the IMU. The file's quaternion is scalar first and takes B components to N;
 with the scalar last the same four numbers are q_BN of this library, because A(q_BN) takes N to B.
 
-- `gravity`: the accelerometer averaged over a window that the gyro carries along; reference up, (0, 0, 1).
+- `gravity`: the accelerometer averaged over a centred window (so a second of the future is used) that the gyro carries
+  along; reference up, (0, 0, 1).
 - `field`: the magnetometer, sample by sample; reference (0, cos dip, -sin dip), the dip taken between accelerometer and
-  magnetometer over the first 20 s, in which every trial rests. North is magnetic north by definition. The optical frame
-  agrees with it to about 1 deg at rest and 3.5 deg in the mean over the motion of trial 01 (0.2 and 1.1 deg as angle
+  magnetometer over the first 20 s, in which the IMU must rest. North is magnetic north by definition. The optical frame
+  agrees with it to about 1 deg at rest and 3.5 deg in the mean over the motion of trial 01 (0.3 and 1.1 deg as angle
   between the steep field directions); no heading is fitted, so this stays in the error that the bounds have to cover.
 - the gyro, less its mean over the rest.
 
@@ -28,6 +29,7 @@ from optsat.errors import InputError, RecordError
 from optsat.records.record import Record, VectorChannel
 
 _REST_S = 20.0
+_REST_RATE = 0.1  # rad/s; noise and bias stay ten times below
 _UP_N = np.array([0.0, 0.0, 1.0])
 _KEYS = {"imu_gyr": 3, "imu_acc": 3, "imu_mag": 3, "opt_quat": 4}
 
@@ -101,13 +103,15 @@ def load_broad(path: str | os.PathLike[str], bounds: BroadBounds | None = None, 
     dt = 1.0 / trial["sampling_rate"].item()
     gyro, acceleration, field = trial["imu_gyr"], trial["imu_acc"], trial["imu_mag"]
     rest = slice(0, round(_REST_S / dt))
+    if len(gyro) * dt <= _REST_S or np.ptp(gyro[rest], axis=0).max() > _REST_RATE:
+        raise RecordError(f"the IMU must rest for the first {_REST_S:g} s; the references come from there.", file=file)
     gyro = gyro - gyro[rest].mean(axis=0)
     up_B, field_B = acceleration[rest].mean(axis=0), field[rest].mean(axis=0)
     sin_dip = -(up_B @ field_B) / (np.linalg.norm(up_B) * np.linalg.norm(field_B))
-    down = float(np.arcsin(np.clip(sin_dip, -1.0, 1.0)))
+    dip = float(np.arcsin(np.clip(sin_dip, -1.0, 1.0)))
     directions = {
         "gravity": (*_gravity(gyro, acceleration, float(np.linalg.norm(up_B)), dt, bounds), _UP_N),
-        "field": (*_field(field, float(np.linalg.norm(field_B)), bounds), np.array([0.0, np.cos(down), -np.sin(down)])),
+        "field": (*_field(field, float(np.linalg.norm(field_B)), bounds), np.array([0.0, np.cos(dip), -np.sin(dip)])),
     }
     keep = slice(None, None, stride)
     rate_bound = bounds.gyro_error_rad_s + bounds.gyro_scale_error * np.linalg.norm(gyro, axis=1)

@@ -128,6 +128,12 @@ def test_refusals(tmp_path: Path) -> None:
     ):
         with pytest.raises(RecordError, match=f"column {column}"):
             load_broad(save(tmp_path, synthetic(**changes)))
+    moving, short = synthetic(), synthetic()
+    moving["imu_gyr"][500:510] += 0.2
+    short |= {key: short[key][:900] for key in ("imu_gyr", "imu_acc", "imu_mag", "opt_quat")}
+    for trial in (moving, short):
+        with pytest.raises(RecordError, match="must rest for the first 20 s"):
+            load_broad(save(tmp_path, trial))
     path = save(tmp_path, synthetic(), "23_disturbed_stationary_magnet_A.mat")
     with pytest.raises(InputError, match="not an undisturbed rotation trial"):
         load_broad(path)

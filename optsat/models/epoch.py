@@ -1,7 +1,7 @@
 """Epoch: the instant at which t = 0, as a Julian date split in two so that no digits are lost.
 
 Models take seconds since their epoch as `t`. One float64 Julian date resolves 40 microseconds only; a whole day and a
-fraction resolve below a nanosecond, and so does `t` over several weeks. The scale is UTC, used as UT1 (|UT1 - UTC| < 0.9 s,
+fraction resolve below a nanosecond, and so does `t` for weeks. The scale is UTC, used as UT1 (|UT1 - UTC| < 0.9 s,
 which turns the Earth by at most 0.004 deg) and without leap seconds inside a run.
 """
 

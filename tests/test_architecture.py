@@ -196,6 +196,10 @@ RULES: dict[str, tuple[Rule, Tree]] = {
         only("models", {"attitude", "symbolic", "arrays", "errors", "units"}),
         {"optsat.models.sun": "from optsat.forms import Point"},
     ),
+    "simulation imports only models, symbolic, attitude, records, arrays, errors and units": (
+        only("simulation", {"models", "symbolic", "attitude", "records", "arrays", "errors", "units"}),
+        {"optsat.simulation.orbit_scenario": "from optsat.determine import certify_attitude"},
+    ),
     "attitude imports only arrays and errors": (
         only("attitude", {"arrays", "errors"}),
         {"optsat.attitude.dcm": "from optsat.symbolic.port import Port"},

@@ -1,0 +1,1 @@
+"""Simulation: records of a spacecraft whose true attitude is known, from models and bounded sensors."""

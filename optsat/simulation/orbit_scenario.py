@@ -2,6 +2,7 @@
 
 import datetime
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,7 +27,7 @@ from optsat.simulation.true_motion import true_motion
 Rate = Literal["lvlh", "inertial"]
 GyroError = Literal["constant", "random"]
 
-EPOCH_OF_2021_MARCH_20_NOON = Epoch(2459294.0)
+EPOCH_OF_2021_MARCH_20_NOON = Epoch(2459293.5, 0.5)
 CHANNELS = ("sun", "magnetometer")
 _WORDS: dict[str, tuple[str, ...]] = {
     "rate": ("lvlh", "inertial"),
@@ -62,7 +63,7 @@ class OrbitScenario:
     raan: float = 0.0
     argument_of_latitude: float = 0.0
     epoch: Epoch = EPOCH_OF_2021_MARCH_20_NOON
-    inertia_B: tuple[tuple[float, float, float], ...] = ((80.0, 0.0, 0.0), (0.0, 80.0, 0.0), (0.0, 0.0, 4.0))
+    inertia_B: Sequence[Sequence[float]] = ((80.0, 0.0, 0.0), (0.0, 80.0, 0.0), (0.0, 0.0, 4.0))
     yaw_pitch_roll: tuple[float, float, float] = (math.radians(5.0), 0.0, 0.0)
     rate: Rate = "lvlh"
     duration: float = 1200.0

@@ -12,7 +12,7 @@ from optsat.symbolic.integrate import rk4_step
 from optsat.symbolic.port import Port
 
 LONGEST_STEP_S = 1.0
-"""Orbital motion turns a body by about a milliradian a second, so one such step of order four errs by less than 1e-15 rad."""
+"""Orbital motion turns a body by a milliradian a second; one such step of order four errs by less than 1e-15 rad."""
 
 
 def true_motion(

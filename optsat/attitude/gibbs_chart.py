@@ -102,21 +102,31 @@ def ball_levels(g: Array, centre: Array, scale: float) -> Array:
     return np.where(root > 0, N / np.maximum(root, 1e-300) ** 2, np.inf)
 
 
-def smallest_ball(g: Array, scale: float, iterations: int = 400) -> Array:
-    """Return the chart point (3,) that nearly minimises the largest angle to points g (k, 3): Badoiu-Clarkson steps."""
-    quaternions = np.concatenate((scale * g, np.ones((len(g), 1))), axis=1)
-    centre = np.append(scale * g.mean(axis=0), 1.0)
-    best, best_level = centre[:3] / scale, np.inf
-    for k in range(iterations):
-        point = centre[:3] / (scale * centre[3])
-        levels = ball_levels(g, point, scale)
-        far = int(np.argmax(levels))
-        if levels[far] < best_level:
-            best, best_level = point, float(levels[far])
-        toward = quaternions[far] / np.linalg.norm(quaternions[far])
-        unit = centre / np.linalg.norm(centre)
-        centre = unit + (toward - unit) / (k + 2)
-    return best
+def smallest_ball(g: Array, scale: float, iterations: int = 1000, tolerance: float = 1e-6) -> Array:
+    """Return the chart point (3,) that minimises the largest angle to points g (k, 3).
+
+    The smallest cap on the sphere of quaternions is cut by the smallest Euclidean ball around them; its dual weights are found
+    by pairwise Frank-Wolfe steps, from the nearest support point to the farthest point, until the squared radius is known to
+    the relative tolerance. Coordinates are taken about the pivot and divided by `scale`, so small sets lose no digits.
+    """
+    square = np.sum(g * g, axis=1)
+    n = np.sqrt(1 + scale**2 * square)
+    points = np.column_stack((g / n[:, None], -scale * square / (n * (n + 1))))
+    weights = np.zeros(len(points))
+    weights[int(np.argmax(square))] = 1.0
+    for _ in range(iterations):
+        support = np.flatnonzero(weights)
+        centre = weights[support] @ points[support]
+        distance = np.sum((points - centre) ** 2, axis=1)
+        far, near = int(np.argmax(distance)), int(support[np.argmin(distance[support])])
+        if distance[far] <= (1 + tolerance) * float(weights[support] @ distance[support]):
+            break
+        step = (distance[far] - distance[near]) / (2 * float(np.sum((points[far] - points[near]) ** 2)))
+        step = min(step, weights[near])
+        weights[near] = 0.0 if step == weights[near] else weights[near] - step
+        weights[far] += step
+    centre = weights @ points
+    return np.asarray(centre[:3] / (1 + scale * centre[3]))
 
 
 def fibonacci_directions(count: int) -> Array:

@@ -67,3 +67,38 @@ def _check(rng: object, count: int, law: str, laws: tuple[str, ...]) -> None:
         raise InputError(f"`count` must be a whole number >= 0, got {count!r}.")
     if law not in laws:
         raise InputError(f"`law` must be one of {', '.join(map(repr, laws))}, got {law!r}.")
+
+
+def tilted(rng: np.random.Generator, directions: Array, half_angle: Array, law: ConeLaw) -> Array:
+    """Return unit directions (..., 3) turned off `directions` (..., 3) by a drawn angle, never above `half_angle` (...) [rad].
+
+    The azimuth is uniform, the angle as in `cone_angles`; one law, a bound for each direction.
+
+    Raises
+    ------
+    InputError : no generator, or an unknown law.
+    """
+    _check(rng, 0, law, ("cap", "angle", "boundary"))
+    across = rng.standard_normal(directions.shape)
+    across -= np.sum(across * directions, axis=-1, keepdims=True) * directions
+    across /= np.linalg.norm(across, axis=-1, keepdims=True)
+    share = np.ones(directions.shape[:-1]) if law == "boundary" else rng.random(directions.shape[:-1])
+    if law == "cap":
+        angle = 2 * np.arcsin(np.sqrt(share) * np.sin(half_angle / 2))
+    else:
+        angle = share * half_angle
+    tilt = np.cos(angle)[..., None] * directions + np.sin(angle)[..., None] * across
+    return np.asarray(tilt / np.linalg.norm(tilt, axis=-1, keepdims=True))
+
+
+def rotations(rng: np.random.Generator, count: int) -> Array:
+    """Return unit quaternions (count, 4) uniform over all attitudes, w >= 0."""
+    q = rng.standard_normal((count, 4))
+    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.asarray(np.where(q[:, 3:] < 0, -q, q))
+
+
+def directions(rng: np.random.Generator, *shape: int) -> Array:
+    """Return unit vectors (*shape, 3) uniform over the sphere."""
+    v = rng.standard_normal((*shape, 3))
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))

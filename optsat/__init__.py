@@ -1,12 +1,15 @@
 """optsat: attitude software that can be trusted in flight, from one symbolic description of a spacecraft.
 
-Importing this package loads NumPy at most; every public name loads its own module on first use.
+Importing this package loads NumPy at most; every public name but `solve` loads its own module on first use.
 """
 
 import importlib
 from typing import TYPE_CHECKING, Any
 
 from optsat._version import __version__
+
+# the module of the verb bears its name: loaded later, it would take the verb's place in this namespace
+from optsat.solve import solve
 
 if TYPE_CHECKING:
     from optsat.attitude.status import AttitudeStatus
@@ -20,7 +23,6 @@ if TYPE_CHECKING:
     from optsat.records.csv_log import read_csv_log, write_csv_log
     from optsat.records.record import Record, VectorChannel
     from optsat.solution import Proof, Solution, Termination
-    from optsat.solve import solve
     from optsat.statistical_bound import statistical_angle_bound
 
 _HOME = {
@@ -48,7 +50,6 @@ _HOME = {
     "certify_record": "optsat.estimators.attitude_series",
     "isolate": "optsat.estimators.isolation",
     "read_csv_log": "optsat.records.csv_log",
-    "solve": "optsat.solve",
     "statistical_angle_bound": "optsat.statistical_bound",
     "wahba": "optsat.determine",
     "write_csv_log": "optsat.records.csv_log",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from optsat.commands import doctor, study
+from optsat.commands import attitude, demo, doctor, simulate, study, verify
 from optsat.commands.output import note
 from optsat.errors import OptsatError
 
@@ -48,6 +48,14 @@ app = typer.Typer(
     rich_markup_mode=None,  # rich draws help in 0.15 s more than it takes to read it
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Example: optsat doctor. Exit codes: 0 done, 1 a finding, 2 wrong usage or bad input.",
+)
+app.command("demo", epilog="Example: optsat demo --out my-demo")(demo.demo_command)
+app.command("attitude", epilog="Example: optsat attitude log.csv --window 60 --plot attitude.svg")(
+    attitude.attitude_command
+)
+app.command("verify", epilog="Example: optsat verify certificate.json")(verify.verify_command)
+app.command("simulate", epilog="Example: optsat simulate scenario.toml --out log.csv --seed 1")(
+    simulate.simulate_command
 )
 app.add_typer(study.app, name="study", epilog="Example: optsat study list")
 app.command("doctor", epilog="Example: optsat doctor --json")(doctor.doctor_command)

@@ -200,6 +200,10 @@ RULES: dict[str, tuple[Rule, Tree]] = {
         only("simulation", {"models", "symbolic", "attitude", "records", "arrays", "errors", "units"}),
         {"optsat.simulation.orbit_scenario": "from optsat.determine import certify_attitude"},
     ),
+    "plots import only estimators, records, arrays and errors": (
+        only("plots", {"estimators", "records", "arrays", "errors"}),
+        {"optsat.plots.bound_figure": "from optsat.campaign.store import write_atomically"},
+    ),
     "attitude imports only arrays and errors": (
         only("attitude", {"arrays", "errors"}),
         {"optsat.attitude.dcm": "from optsat.symbolic.port import Port"},

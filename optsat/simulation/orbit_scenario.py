@@ -102,7 +102,7 @@ class OrbitScenario:
 
     def times(self) -> Array:
         """Return the times (T,) of the samples [s]."""
-        return np.asarray(np.arange(math.floor(self.duration / self.dt * (1 + 1e-12)) + 1) * self.dt)
+        return self.dt * np.arange(math.floor(self.duration / self.dt * (1 + 1e-12)) + 1, dtype=np.float64)
 
     def truth(self) -> tuple[Array, Array]:
         """Return q_BN (T, 4) and omega_BN_B (T, 3) [rad/s]."""

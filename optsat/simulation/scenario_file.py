@@ -22,27 +22,27 @@ class _Table(BaseModel):
 
 
 class _Orbit(_Table):
-    altitude_km: float = Field(800.0, ge=100, le=100_000)
-    inclination_deg: float = Field(75.0, ge=0, le=180)
-    raan_deg: float = Field(0.0, ge=-360, le=360)
-    argument_of_latitude_deg: float = Field(0.0, ge=-360, le=360)
+    altitude_km: float = Field(default=800.0, ge=100, le=100_000)
+    inclination_deg: float = Field(default=75.0, ge=0, le=180)
+    raan_deg: float = Field(default=0.0, ge=-360, le=360)
+    argument_of_latitude_deg: float = Field(default=0.0, ge=-360, le=360)
 
 
 class _Body(_Table):
-    inertia_kg_m2: list[list[float]] = Field([[80.0, 0.0, 0.0], [0.0, 80.0, 0.0], [0.0, 0.0, 4.0]])
-    yaw_deg: float = Field(5.0, ge=-360, le=360)
-    pitch_deg: float = Field(0.0, ge=-90, le=90)
-    roll_deg: float = Field(0.0, ge=-360, le=360)
+    inertia_kg_m2: list[list[float]] = Field(default=[[80.0, 0.0, 0.0], [0.0, 80.0, 0.0], [0.0, 0.0, 4.0]])
+    yaw_deg: float = Field(default=5.0, ge=-360, le=360)
+    pitch_deg: float = Field(default=0.0, ge=-90, le=90)
+    roll_deg: float = Field(default=0.0, ge=-360, le=360)
     rate: Rate = "lvlh"
 
 
 class _Sun(_Table):
-    bound_deg: float = Field(0.005, ge=0, lt=180)
+    bound_deg: float = Field(default=0.005, ge=0, lt=180)
     eclipse: bool = False
 
 
 class _Magnetometer(_Table):
-    bound_deg: float = Field(0.5, ge=0, lt=180)
+    bound_deg: float = Field(default=0.5, ge=0, lt=180)
 
 
 class _Gyro(_Table):
@@ -55,7 +55,7 @@ class _Fault(_Table):
     kind: FaultKind = "offset"
     start_s: float
     stop_s: float
-    angle_deg: float = Field(0.0, ge=0, le=180)
+    angle_deg: float = Field(default=0.0, ge=0, le=180)
 
     def fault(self) -> SensorFault:
         return SensorFault(self.channel, self.start_s, self.stop_s, self.kind, math.radians(self.angle_deg))
@@ -63,15 +63,15 @@ class _Fault(_Table):
 
 class _Scenario(_Table):
     epoch: str | datetime.datetime = "2021-03-20T12:00:00Z"
-    duration_s: float = Field(1200.0, ge=0, le=1e7)
-    dt_s: float = Field(1.0, gt=0, le=3600)
+    duration_s: float = Field(default=1200.0, ge=0, le=1e7)
+    dt_s: float = Field(default=1.0, gt=0, le=3600)
     noise: ConeLaw = "cap"
     orbit: _Orbit = _Orbit()
     body: _Body = _Body()
     sun: _Sun = _Sun()
     magnetometer: _Magnetometer = _Magnetometer()
     gyro: _Gyro | None = None
-    faults: list[_Fault] = Field([])
+    faults: list[_Fault] = Field(default=[])
 
     def scenario(self) -> OrbitScenario:
         orbit, body = self.orbit, self.body
@@ -108,10 +108,20 @@ def read_scenario(path: str | os.PathLike[str]) -> OrbitScenario:
     ------
     InputError : no such file, not TOML, an unknown entry (the nearest is offered), a value outside its range.
     """
+    return parse_scenario(read_text(path), os.fspath(path))
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Return the text of a scenario file.
+
+    Raises
+    ------
+    InputError : no such file, not UTF-8.
+    """
     file = os.fspath(path)
     try:
         with open(file, encoding="utf-8-sig") as stream:
-            return parse_scenario(stream.read(), file)
+            return stream.read()
     except OSError as error:
         raise InputError(f"{file}: the scenario cannot be opened: {error.strerror}.") from None
     except UnicodeDecodeError:

@@ -15,7 +15,12 @@ from optsat.campaign import catalogue
 from optsat.cli import app
 
 TOY = Path(__file__).parent / "campaign" / "toy_study.py"
-COMMANDS: tuple[list[str], ...] = ([], ["study"], ["study", "list"], ["study", "run"], ["doctor"])
+COMMANDS: tuple[list[str], ...] = (
+    [],
+    *(["demo"], ["attitude"], ["verify"], ["simulate"]),
+    *(["study"], ["study", "list"], ["study", "run"]),
+    ["doctor"],
+)
 
 
 @pytest.fixture

@@ -1,0 +1,1 @@
+"""Plots: figures as objects, rendered to bytes; no window is opened and no global state is touched."""

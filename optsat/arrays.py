@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from optsat.errors import InputError
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 NormPolicy = Literal["warn", "error", "silent"]
 
 
@@ -55,7 +56,8 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
 def _first_text(raw: NDArray[Any]) -> str:
     for index, item in np.ndenumerate(raw):
         if isinstance(item, str | bytes):
-            return f": entry {index if len(index) > 1 else index[0]} is {item!r}"
+            place = tuple(int(i) for i in index)
+            return f": entry {place[0] if len(place) == 1 else place} is {item!r}"
     return ""
 
 
@@ -107,7 +109,7 @@ def direction_pairs(
             f"{shapes[0]} and {shapes[1]}. "
             "Did you pass columns? Use `.T`."
         )
-    if 0 in shapes[0][:1]:
+    if len(shapes[0]) > 0 and shapes[0][0] == 0:
         raise InputError(f"`{names[0]}` holds no vectors; at least one row of shape (m, 3) is needed.")
     b = unit_rows(names[0], b_B, norm_policy)
     r = unit_rows(names[1], r_N, norm_policy)

@@ -128,6 +128,7 @@ class CertifiedAttitudeProblem:
     norm_policy: NormPolicy = "warn"
     admissible: AdmissibleSet = field(init=False, repr=False)
     inflation_rad: float = field(init=False, default=0.0)
+    contradicting: tuple[tuple[int, int], ...] = field(init=False, repr=False, default=())
 
     def __post_init__(self) -> None:
         b_B, r_N, bound, cut_B, cut_N, level = box_constraints(self.b_B, self.r_N, self.angle_bound_rad, self.cuts)
@@ -135,7 +136,9 @@ class CertifiedAttitudeProblem:
         eps = angle_bounds("angle_bound_rad", bound, len(b))
         admissible = AdmissibleSet(b, r, eps, cut_B, cut_N, level)
         excess = admissible.mismatch_rad() - eps[:, None] - eps[None, :]
-        if 0.0 < float(excess.max()) <= _GRANTED_RAD:
+        largest = float(excess.max())
+        object.__setattr__(self, "contradicting", admissible.inconsistent_pairs() if largest > _GRANTED_RAD else ())
+        if 0.0 < largest <= _GRANTED_RAD:
             object.__setattr__(self, "inflation_rad", _GRANTED_RAD)
             admissible = AdmissibleSet(b, r, np.minimum(eps + _GRANTED_RAD, np.pi), cut_B, cut_N, level)
         object.__setattr__(self, "admissible", admissible)
@@ -190,8 +193,7 @@ class CertifiedAttitudeProblem:
                 q_BN = canonical(smallest_rotation(certificate.q_BN, here.free_axes_B))
                 certificate = replace(certificate, q_BN=q_BN)
             axis = here.free_axes_B[0] if len(here.free_axes_B) == 1 else None
-        # granted rounding was added to the bounds, so two directions that just touch are no contradiction
-        contradicting = data.inconsistent_pairs(0.0 if self.inflation_rad else _GRANTED_RAD)
+        contradicting = self.contradicting
         if contradicting:
             certificate = replace(certificate, status=AttitudeStatus.INCONSISTENT, bound_rad=0.0, pair=contradicting[0])
         suspects = tuple(sorted({i for pair in contradicting for i in pair}))

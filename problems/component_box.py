@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optsat.arrays import Array, finite_array
+from optsat.arrays import Array, Mask, finite_array
 from optsat.errors import InfeasibleBoxError, InputError
 
 _SLACK = 1e-12
@@ -117,7 +117,7 @@ class ComponentBox:
         return best
 
     @staticmethod
-    def _patch_value(u: Array, x: Array, free: Array, low: Array, high: Array) -> float:
+    def _patch_value(u: Array, x: Array, free: Mask, low: Array, high: Array) -> float:
         rest = 1.0 - float(x @ x)
         if not free.any():
             return float(u @ x) if abs(rest) <= _SLACK else -np.inf

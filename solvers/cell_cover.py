@@ -33,7 +33,7 @@ class CellCoverSolver:
     cells: int = 64
     gap: float = 0.02
     rays: int = 512
-    conic: Clarabel = field(default_factory=lambda: Clarabel(tolerance=1e-8))
+    conic: Clarabel = field(default_factory=lambda: Clarabel(tolerance=1e-8, prescaled=True))
     name: str = "cell_cover"
 
     def accepts(self, form: object) -> bool:

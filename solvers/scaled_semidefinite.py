@@ -10,15 +10,18 @@ from functools import cache
 
 import numpy as np
 
-from optsat.arrays import Array
+from optsat.arrays import Array, Mask
 from optsat.attitude.admissible_set import AdmissibleSet
-from optsat.attitude.davenport import davenport_matrix, dominant_quaternion, turn
+from optsat.attitude.davenport import davenport_matrix, dominant_quaternion
 from optsat.attitude.gibbs_chart import GibbsChart
+from optsat.errors import InputError
 from optsat.forms import ConeKind, ConicForm, EnclosureForm, Point, symmetric_vector
 from optsat.solution import Termination
 from optsat.solvers.clarabel import Clarabel
 
 _LARGEST_SCALE = np.tan(np.pi / 3)
+# a ball that shrank to less than this share of the pivot's deserves a pivot of its own
+_WORTH_RENEWING = 0.3
 
 
 @dataclass(frozen=True)
@@ -30,8 +33,12 @@ class ScaledSemidefinite:
     """
 
     passes: int = 2
-    conic: Clarabel = field(default_factory=Clarabel)
+    conic: Clarabel = field(default_factory=lambda: Clarabel(prescaled=True))
     name: str = "scaled_semidefinite"
+
+    def __post_init__(self) -> None:
+        if self.passes < 1:
+            raise InputError(f"`passes` must be at least 1, got {self.passes}.")
 
     def accepts(self, form: object) -> bool:
         """Return whether the form asks for an enclosing ball."""
@@ -42,17 +49,21 @@ class ScaledSemidefinite:
         assert isinstance(form, EnclosureForm)
         admissible = form.admissible
         weights = pivot_weights(admissible) if start is None else start.dual
-        chart, candidates, iterations = _pivot_chart(admissible, weights), [weights], 0
-        for _ in range(self.passes):
-            last, found = _solve_about(chart, self.conic)
-            iterations += last.iterations
+        candidates, iterations = [weights], 0
+        chart = pivot_chart(admissible, weights)
+        last, found = _solve_about(chart, self.conic)
+        for _ in range(self.passes - 1):
             if found is None:
                 break
-            weights, former = found, chart.scale
-            candidates.append(weights)
-            chart = _pivot_chart(admissible, weights)
-            if last.termination is Termination.CONVERGED and 0.3 * former < chart.scale < _LARGEST_SCALE:
+            candidates.append(found)
+            if last.termination is Termination.CONVERGED and _radius_in(chart, found) > _WORTH_RENEWING:
                 break
+            iterations += last.iterations
+            chart = pivot_chart(admissible, found)
+            last, found = _solve_about(chart, self.conic)
+        if found is not None and found is not candidates[-1]:
+            candidates.append(found)
+        weights, iterations = candidates[-1], iterations + last.iterations
         return Point(
             x=chart.q_BN,
             dual=weights,
@@ -70,20 +81,28 @@ def pivot_weights(admissible: AdmissibleSet) -> Array:
     return np.concatenate((weights / weights.sum(), np.zeros(len(admissible.cut_level))))
 
 
-def _pivot_chart(admissible: AdmissibleSet, weights: Array) -> GibbsChart:
+def pivot_chart(admissible: AdmissibleSet, weights: Array) -> GibbsChart:
     """Return the chart about the Davenport attitude of `weights`, in units of the ball that they prove."""
     q_BN = dominant_quaternion(davenport_matrix(admissible.left_B, admissible.right_N, weights))
-    a, h, G = admissible.centred(q_BN)
-    C = -np.einsum("m,mij->ij", weights, G)
+    quadratics = admissible.centred(q_BN)
+    scale = _radius(weights, *quadratics)
+    return GibbsChart.of(admissible, q_BN, _LARGEST_SCALE if scale > _LARGEST_SCALE else max(scale, 1e-13), quadratics)
+
+
+def _radius(weights: Array, a: Array, h: Array, G: Array) -> float:
+    """Return tan(theta / 2) of the ball that the weighted quadratics a + 2 h.g + g^T G g prove, to first order."""
+    C = -np.tensordot(weights, G, 1)
     c = float(np.linalg.eigvalsh(C)[0])
-    scale = np.inf
-    if c > 1e-14:
-        step = np.linalg.solve(C, weights @ h)
-        if float(np.linalg.norm(step)) < 1.0:
-            q_BN = turn(q_BN, step)
-            a = admissible.centred(q_BN)[0]
-        scale = float(np.sqrt(max(float(weights @ a), 0.0) / c))
-    return GibbsChart.about(admissible, q_BN, _LARGEST_SCALE if scale > _LARGEST_SCALE else max(scale, 1e-13))
+    if c <= 1e-14:
+        return float("inf")
+    pull = weights @ h
+    value = float(weights @ a) + float(pull @ np.linalg.solve(C, pull))
+    return float(np.sqrt(max(value, 0.0) / c))
+
+
+def _radius_in(chart: GibbsChart, weights: Array) -> float:
+    """Return the radius that the weights prove, in units of the chart's own."""
+    return _radius(weights * chart.size, chart.a, chart.h, chart.G)
 
 
 def _solve_about(chart: GibbsChart, conic: Clarabel) -> tuple[Point, Array | None]:
@@ -97,7 +116,7 @@ def _solve_about(chart: GibbsChart, conic: Clarabel) -> tuple[Point, Array | Non
     return point, weights / total if 0 < total < np.inf else None
 
 
-def _active(chart: GibbsChart) -> Array:
+def _active(chart: GibbsChart) -> Mask:
     # a constraint that holds on the whole unit ball can only have multiplier 0
     if chart.scale >= _LARGEST_SCALE or len(chart.a) <= 8:
         return np.ones(len(chart.a), dtype=bool)

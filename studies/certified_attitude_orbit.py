@@ -1,4 +1,5 @@
-"""Orbit run of the interval-Wahba paper: plain, weighted, certified and windowed attitude over three epochs, five seeds.
+"""Orbit run of the interval-Wahba paper: plain, weighted, certified and windowed attitude over three epochs, five
+seeds.
 
 Memoryless figures: every epoch of 1201. Windowed figures: from one window length on. The fair peer of the window is the
 weighted least squares over the very same pairs.

@@ -7,9 +7,27 @@ from optsat.attitude import dcm, quaternion
 from optsat.attitude.edges import unchecked
 
 # inner-loop forms: their arguments come from this package, so the checks of the public edge are left out
-rotation_matrix = unchecked(dcm.from_quaternion)
+_rotation_matrices = unchecked(dcm.from_quaternion)
 quaternion_from_dcm = unchecked(dcm.to_quaternion)
 canonical = unchecked(quaternion.canonical)
+
+_IDENTITY = np.eye(3)
+
+
+def rotation_matrix(q_BN: Array) -> Array:
+    """Return A(q_BN) (..., 3, 3) of quaternions that are unit to rounding."""
+    if q_BN.ndim > 1:
+        return np.asarray(_rotation_matrices(q_BN))
+    # one attitude: the formula of `dcm.from_quaternion` on Python floats takes a tenth of the time, bit for bit the
+    # same
+    x, y, z, w = q_BN.tolist()
+    return np.array(
+        (
+            (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
+            (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
+            (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)),
+        )
+    )
 
 
 def davenport_matrix(b_B: Array, r_N: Array, weights: Array) -> Array:
@@ -19,13 +37,12 @@ def davenport_matrix(b_B: Array, r_N: Array, weights: Array) -> Array:
     Source: Davenport's q-method; Markley & Crassidis, Fundamentals of Spacecraft Attitude Determination, 5.3.
     """
     weighted = weights[..., None] * b_B
-    B = np.einsum("...mi,...mj->...ij", weighted, r_N)
-    trace = np.trace(B, axis1=-2, axis2=-1)
+    B = np.swapaxes(weighted, -1, -2) @ r_N
+    trace = B[..., 0, 0] + B[..., 1, 1] + B[..., 2, 2]
     K = np.empty((*B.shape[:-2], 4, 4))
-    K[..., :3, :3] = B + np.swapaxes(B, -1, -2) - trace[..., None, None] * np.eye(3)
-    z = np.stack((B[..., 1, 2] - B[..., 2, 1], B[..., 2, 0] - B[..., 0, 2], B[..., 0, 1] - B[..., 1, 0]), axis=-1)
-    K[..., :3, 3] = z
-    K[..., 3, :3] = z
+    K[..., :3, :3] = B + np.swapaxes(B, -1, -2) - trace[..., None, None] * _IDENTITY
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        K[..., k, 3] = K[..., 3, k] = B[..., i, j] - B[..., j, i]
     K[..., 3, 3] = trace
     return K
 
@@ -62,8 +79,7 @@ def centred_blocks(u_B: Array, y_B: Array, level: Array) -> tuple[Array, Array]:
     u_B, y_B : (..., m, 3); level : (..., m). The scalar entry is left to the caller, who knows a form without
     cancellation.
     """
-    linear = cross_rows(u_B, y_B)
     outer = u_B[..., :, None] * y_B[..., None, :]
-    dot = np.sum(u_B * y_B, axis=-1)
-    block = outer + np.swapaxes(outer, -1, -2) - (dot + level)[..., None, None] * np.eye(3)
-    return linear, block
+    dot = outer[..., 0, 0] + outer[..., 1, 1] + outer[..., 2, 2]
+    block = outer + np.swapaxes(outer, -1, -2) - (dot + level)[..., None, None] * _IDENTITY
+    return cross_rows(u_B, y_B), block

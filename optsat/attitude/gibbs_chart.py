@@ -38,7 +38,14 @@ class GibbsChart:
     @staticmethod
     def about(admissible: AdmissibleSet, q_BN: Array, scale: float) -> "GibbsChart":
         """Return the chart of an admissible set about q_BN."""
-        a, h, G = admissible.centred(q_BN)
+        return GibbsChart.of(admissible, q_BN, scale, admissible.centred(q_BN))
+
+    @staticmethod
+    def of(
+        admissible: AdmissibleSet, q_BN: Array, scale: float, quadratics: tuple[Array, Array, Array]
+    ) -> "GibbsChart":
+        """Return the chart about q_BN from the constraints a + 2 h.g + g^T G g that `admissible.centred` gave there."""
+        a, h, G = quadratics
         h, G = scale * h, scale**2 * G
         size = np.maximum(np.maximum(np.abs(a), np.abs(h).max(axis=1)), np.abs(G).max(axis=(1, 2)))
         size = np.maximum(size, np.finfo(float).tiny)
@@ -105,8 +112,10 @@ def ball_levels(g: Array, centre: Array, scale: float) -> Array:
 def smallest_ball(g: Array, scale: float, iterations: int = 1000, tolerance: float = 1e-6) -> Array:
     """Return the chart point (3,) that minimises the largest angle to points g (k, 3).
 
-    The smallest cap on the sphere of quaternions is cut by the smallest Euclidean ball around them; its dual weights are found
-    by pairwise Frank-Wolfe steps, from the nearest support point to the farthest point, until the squared radius is known to
+    The smallest cap on the sphere of quaternions is cut by the smallest Euclidean ball around them; its dual weights
+    are found
+    by pairwise Frank-Wolfe steps, from the nearest support point to the farthest point, until the squared radius is
+    known to
     the relative tolerance. Coordinates are taken about the pivot and divided by `scale`, so small sets lose no digits.
     """
     square = np.sum(g * g, axis=1)

@@ -47,14 +47,14 @@ def weighted_sum(
     weights : (..., m), or (m + k,) when `cuts` holds k half-space cuts (one pose only).
     """
     m = b_B.shape[-2]
-    y_B = np.einsum("...ij,...mj->...mi", rotation_matrix(q_BN), r_N)
+    y_B = r_N @ np.swapaxes(rotation_matrix(q_BN), -1, -2)
     gap = b_B - y_B
     value = versine - 0.5 * np.sum(gap * gap, axis=-1)
     linear, block = centred_blocks(b_B, y_B, 1.0 - versine)
     w = weights[..., :m]
     a = np.sum(w * value, axis=-1)
-    h = np.sum(w[..., None] * linear, axis=-2)
-    C = -np.sum(w[..., None, None] * block, axis=-3)
+    h = (w[..., None, :] @ linear)[..., 0, :]
+    C = -(w[..., None, :] @ block.reshape(*block.shape[:-2], 9)).reshape(*h.shape, 3)
     scale = np.sum(w * np.sqrt(2 * versine), axis=-1)
     magnitude = np.sum(w, axis=-1)
     if cuts is not None and len(cuts.cut_level):

@@ -79,7 +79,9 @@ class AttitudeSeries:
         return error
 
 
-def certify_record(record: Record, window: Window | None = None, progress: Progress | None = None) -> AttitudeSeries:
+def certify_record(
+    record: Record, window: Window | None = None, progress: Progress | None = None, *, every: int = 1
+) -> AttitudeSeries:
     """Return certified attitudes of every epoch of a record.
 
     Without a window each epoch stands alone. With one, every accepted past pair is carried to the present by the
@@ -87,29 +89,33 @@ def certify_record(record: Record, window: Window | None = None, progress: Progr
     bound is widened by what the gyro's own bound allows: |rotation error| <= integral of |rate error|.
 
     progress : called with (epochs done, epochs in all)
+    every : determine every so-manieth epoch of the record; the gyro between them is used all the same
 
     Raises
     ------
-    InputError : a window without gyro or without its bound.
+    InputError : a window without gyro or without its bound; `every` below 1.
     Source: robust Wahba specification, section 7.3.
     """
     relative = None if window is None else RelativeAttitude.of(record)
-    count = len(record.t)
+    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
+        raise InputError(f"`every` must be a whole number >= 1, got {every!r}.")
+    epochs = range(0, len(record.t), every)
+    count = len(epochs)
     names = tuple(channel.name for channel in record.channels)
     q_BN, bound = np.full((count, 4), np.nan), np.full(count, np.nan)
     status, used = np.full(count, -1, dtype=np.int8), np.zeros(count, dtype=np.int64)
     rejected = np.zeros((count, len(names)), dtype=bool)
     history = History(record, window, relative) if window is not None and relative is not None else None
-    for k in range(count):
+    for row, k in enumerate(epochs):
         present = np.array([i for i, channel in enumerate(record.channels) if channel.valid[k]], dtype=np.int64)
         result, left_out, pairs = _epoch(record, k, present, history)
-        rejected[k, left_out] = True
-        used[k] = pairs
+        rejected[row, left_out] = True
+        used[row] = pairs
         if result is not None:
-            q_BN[k], bound[k], status[k] = result
+            q_BN[row], bound[row], status[row] = result
         if progress is not None:
-            progress(k + 1, count)
-    return AttitudeSeries(record.t, q_BN, bound, status, used, rejected, names, window is not None)
+            progress(row + 1, count)
+    return AttitudeSeries(record.t[::every], q_BN, bound, status, used, rejected, names, window is not None)
 
 
 _Result = tuple[Array, float, int]

@@ -70,7 +70,8 @@ def _check(rng: object, count: int, law: str, laws: tuple[str, ...]) -> None:
 
 
 def tilted(rng: np.random.Generator, directions: Array, half_angle: Array, law: ConeLaw) -> Array:
-    """Return unit directions (..., 3) turned off `directions` (..., 3) by a drawn angle, never above `half_angle` (...) [rad].
+    """Return unit directions (..., 3) turned off `directions` (..., 3) by a drawn angle, never above `half_angle`
+    (...) [rad].
 
     The azimuth is uniform, the angle as in `cone_angles`; one law, a bound for each direction.
 
@@ -83,10 +84,8 @@ def tilted(rng: np.random.Generator, directions: Array, half_angle: Array, law: 
     across -= np.sum(across * directions, axis=-1, keepdims=True) * directions
     across /= np.linalg.norm(across, axis=-1, keepdims=True)
     share = np.ones(directions.shape[:-1]) if law == "boundary" else rng.random(directions.shape[:-1])
-    if law == "cap":
-        angle = 2 * np.arcsin(np.sqrt(share) * np.sin(half_angle / 2))
-    else:
-        angle = share * half_angle
+    cap = 2 * np.arcsin(np.sqrt(share) * np.sin(half_angle / 2))
+    angle = cap if law == "cap" else share * half_angle
     tilt = np.cos(angle)[..., None] * directions + np.sin(angle)[..., None] * across
     return np.asarray(tilt / np.linalg.norm(tilt, axis=-1, keepdims=True))
 

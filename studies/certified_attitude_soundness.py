@@ -38,8 +38,8 @@ def run(case: Case, rng: np.random.Generator) -> Row:
 
 def _bounds(rng: np.random.Generator, poses: int, vectors: int) -> Array:
     small = rng.random(poses) < 1 / 7
-    low = np.where(small, np.log(1e-9), np.log(np.deg2rad(1e-4)))
-    high = np.where(small, np.log(1e-6), np.log(np.deg2rad(20.0)))
+    low = np.log(np.where(small, 1e-9, np.deg2rad(1e-4)))
+    high = np.log(np.where(small, 1e-6, np.deg2rad(20.0)))
     return np.asarray(np.exp(rng.uniform(low[:, None], high[:, None], (poses, vectors))))
 
 

@@ -62,7 +62,8 @@ def symmetric_matrix(rows: Array, k: int) -> Array:
 
 def conic(q: object, A: object, b: object, *cones: tuple[ConeKind, int]) -> ConicProblem:
     """Return a conic problem from nested lists."""
-    return ConicProblem(ConicForm(*(np.array(part, dtype=np.float64) for part in (q, A, b)), cones))
+    costs, matrix, right = (np.array(part, dtype=np.float64) for part in (q, A, b))
+    return ConicProblem(ConicForm(costs, matrix, right, cones))
 
 
 MATRIX = np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 1.0], [0.0, 1.0, 2.0]])

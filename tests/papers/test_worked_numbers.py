@@ -24,7 +24,7 @@ HALF = np.array([0.5, 0.5])
 
 
 def unit(rows: Array) -> Array:
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 
 
 def test_item_1_matrix_of_a_quaternion() -> None:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -141,3 +142,12 @@ def test_wrong_usage(
     assert says in result.stderr
     assert result.stdout == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_trial_of_broad(shared_data: Callable[[str], Path]) -> None:
+    trial = shared_data("broad/01_undisturbed_slow_rotation_A.mat")
+    result = invoke("attitude", trial, "--format", "broad", "--stride", 2000, "--json")
+    assert result.exit_code == 0
+    document = json.loads(result.stdout)
+    assert document["counts"]["ok"] == document["epochs"] == 29
+    assert document["accuracy"]["violations"] == 0

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from optsat.attitude import dcm, euler321, frames, quaternion
+from optsat.determine import certify_attitude_batch
 from optsat.errors import InputError
 from optsat.models.epoch import Epoch
 from optsat.models.rigid_body import RigidBody
@@ -204,3 +205,24 @@ def test_twenty_minutes_take_less_than_a_second() -> None:
     start = time.process_time()
     scenario.simulate(np.random.default_rng(0))
     assert time.process_time() - start < 1.0
+
+
+@pytest.mark.parametrize(
+    ("julian_date", "rms_deg", "rms_bound_deg"),
+    [(2459294.0, 0.4991, 0.8807), (2459385.0, 0.2801, 0.4843), (2459475.5, 0.4428, 0.7816)],
+)
+def test_errors_and_bounds_are_those_of_the_specification(
+    julian_date: float, rms_deg: float, rms_bound_deg: float
+) -> None:
+    record = OrbitScenario(epoch=Epoch.from_julian_date(julian_date)).simulate(np.random.default_rng(0))
+    b_B, r_N, bound = (
+        np.stack([getattr(channel, name) for channel in record.channels], axis=1)
+        for name in ("b_B", "r_N", "angle_bound_rad")
+    )
+    attitude = certify_attitude_batch(b_B, r_N, bound)
+    assert record.q_BN_true is not None
+    error = quaternion.error_angle(attitude.q_BN, record.q_BN_true)
+    assert np.all(error <= attitude.bound_rad)
+    # another seed than the specification's, so the errors agree to the spread of 1201 draws
+    assert np.degrees(np.sqrt(np.mean(error**2))) == pytest.approx(rms_deg, rel=0.05)
+    assert np.degrees(np.sqrt(np.mean(attitude.bound_rad**2))) == pytest.approx(rms_bound_deg, rel=0.02)

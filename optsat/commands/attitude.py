@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optsat.commands.output import AsJson, aligned, note, print_json, progress_bar
-from optsat.commands.series_output import report_document, report_rows, require_folders
+from optsat.commands.series_output import finding, report_document, report_rows, require_folders
 from optsat.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def attitude_command(
     if out is not None:
         write_atomically(out, series_csv(series).encode())
     if plot is not None:
-        write_atomically(plot, _figure(record, series, truth, figure_kind))
+        write_atomically(plot, _figure(record, series, truth, finding(report).capitalize(), figure_kind))
     if certificates is not None:
         write_atomically(certificates, _certificates(record, stride).encode())
     if as_json:
@@ -129,15 +129,9 @@ def _figure_format(plot: Path | None) -> str:
     return figure_format(str(plot))
 
 
-def _figure(record: "Record", series: "AttitudeSeries", truth: "Array | None", kind: str) -> bytes:
-    from optsat.estimators.series_report import report_series
+def _figure(record: "Record", series: "AttitudeSeries", truth: "Array | None", title: str, kind: str) -> bytes:
     from optsat.plots.bound_figure import bound_figure, rendered, shades_of
 
-    report = report_series(series, truth)
-    title = f"Attitude determined in {report.counts['ok']} of {report.epochs} epochs"
-    if report.accuracy is not None:
-        beyond = report.accuracy.violations
-        title += f"; {beyond or 'no'} error{'s' if beyond > 1 else ''} beyond the guaranteed bound"
     name = "windowed" if series.windowed else "single frame"
     return rendered(bound_figure({name: series}, truth, title, shades_of(record, series)), kind)
 

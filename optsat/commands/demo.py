@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optsat.commands.output import AsJson, aligned, print_json, progress_bar
-from optsat.commands.series_output import degrees, report_document, spans_in_words
+from optsat.commands.series_output import degrees, finding, report_document, spans_in_words, violations
 from optsat.errors import InputError
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def demo_command(
         )
     else:
         typer.echo(_table(reports, common))
-        if _violations(reports[SINGLE]):
+        if violations(reports[SINGLE]):
             typer.echo(f"\n{_WHY_SINGLE_FRAMES_FAIL}")
         typer.echo(f"\nCertificate {'accepted' if verdict else 'REJECTED'}: {certificate.claim}\n")
         typer.echo(
@@ -92,12 +92,8 @@ def demo_command(
                 ]
             )
         )
-    if _violations(reports[WINDOWED]) or not verdict:
+    if violations(reports[WINDOWED]) or not verdict:
         raise typer.Exit(1)
-
-
-def _violations(report: "SeriesReport") -> int:
-    return 0 if report.accuracy is None else report.accuracy.violations
 
 
 def _middle_certificate(record: "Record", series: "AttitudeSeries") -> "AttitudeCertificate":
@@ -143,7 +139,7 @@ def _table(reports: "dict[str, SeriesReport]", common: dict[str, dict[str, Any]]
             ("  RMS of the true error [deg]", *(_figure(one["rms_deg"]) for one in both)),
             ("  median guaranteed bound [deg]", *(_figure(one["median_bound_deg"]) for one in both)),
             ("largest guaranteed bound [deg]", *(degrees(report.largest_bound_rad or 0.0) for report in each)),
-            ("errors beyond their bound", *(_violations(report) for report in each)),
+            ("errors beyond their bound", *(violations(report) for report in each)),
             ("measurements rejected", *(rejected(report) for report in each)),
             ("no attitude fits", *(spans_in_words(report.inconsistent) or "never" for report in each)),
         ]
@@ -154,17 +150,11 @@ def _figure(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}"
 
 
-def _finding(name: str, report: "SeriesReport") -> str:
-    count = _violations(report)
-    beyond = f"{count or 'no'} error{'s' if count > 1 else ''} beyond the bound"
-    return f"{name.capitalize()}: attitude in {report.counts['ok']} of {report.epochs} epochs, {beyond}"
-
-
 def _draw(record: "Record", series: "dict[str, AttitudeSeries]", reports: "dict[str, SeriesReport]", out: Path) -> None:
     from optsat.campaign.store import write_atomically
     from optsat.plots.bound_figure import FORMATS, bound_figure, rendered, shades_of
 
-    title = "\n".join(_finding(name, report) for name, report in reports.items())
+    title = "\n".join(f"{name.capitalize()}: {finding(report)}" for name, report in reports.items())
     figure = bound_figure(series, record.q_BN_true, title, shades_of(record, series[WINDOWED]))
     for kind in FORMATS:
         write_atomically(out / f"figure.{kind}", rendered(figure, kind))

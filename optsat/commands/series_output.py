@@ -71,6 +71,20 @@ def report_document(report: "SeriesReport") -> dict[str, Any]:
     }
 
 
+def finding(report: "SeriesReport") -> str:
+    """Return the outcome of a series as part of a title."""
+    says = f"attitude in {report.counts['ok']} of {report.epochs} epochs"
+    if report.accuracy is None:
+        return says
+    count = violations(report)
+    return f"{says}, {count or 'no'} error{'s' if count > 1 else ''} beyond the bound"
+
+
+def violations(report: "SeriesReport") -> int:
+    """Return how many errors are beyond their bound, as far as the truth is known."""
+    return 0 if report.accuracy is None else report.accuracy.violations
+
+
 def spans_in_words(spans: "tuple[TimeSpan, ...]") -> str:
     """Return '50 epochs, 300 to 349 s', the first few spans where there are many; empty without any."""
     if not spans:

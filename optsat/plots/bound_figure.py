@@ -119,7 +119,7 @@ def _dress(axes: "Axes", title: str) -> None:
     axes.grid(True, which="major", color="#CCCCCC", linewidth=0.7, zorder=1)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    axes.set_title(title, fontsize=15, color=_INK, loc="left", pad=26, fontweight="bold")
+    axes.set_title(title, fontsize=14.5, color=_INK, loc="left", pad=26, fontweight="bold")
 
 
 def _explain(figure: "Figure", axes: "Axes", rows: int) -> None:

@@ -159,7 +159,7 @@ class CertifiedAttitudeProblem:
         An earlier pass's where they prove none.
         """
         certificate, ball = self._certificate(point.dual)
-        if ball.status is AttitudeStatus.UNBOUNDED:
+        if ball.status is AttitudeStatus.UNBOUNDED or point.termination is not Termination.CONVERGED:
             others = (self._certificate(weights) for weights in point.stats.get("candidates", ()))
             certificate, ball = min(
                 ((certificate, ball), *others), key=lambda pair: (not bool(pair[1].empty), float(pair[1].bound_rad))

@@ -86,7 +86,10 @@ def pivot_chart(admissible: AdmissibleSet, weights: Array) -> GibbsChart:
     q_BN = dominant_quaternion(davenport_matrix(admissible.left_B, admissible.right_N, weights))
     quadratics = admissible.centred(q_BN)
     scale = _radius(weights, *quadratics)
-    return GibbsChart.of(admissible, q_BN, _LARGEST_SCALE if scale > _LARGEST_SCALE else max(scale, 1e-13), quadratics)
+    if scale == 0.0:
+        # the weights themselves contradict the data, or nearly so: the bounds alone give the size
+        scale = float(np.sqrt(max(float(weights[: admissible.cone_count] @ admissible.cone_versine), 1e-26)))
+    return GibbsChart.of(admissible, q_BN, min(scale, _LARGEST_SCALE), quadratics)
 
 
 def _radius(weights: Array, a: Array, h: Array, G: Array) -> float:

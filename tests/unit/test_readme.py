@@ -1,0 +1,37 @@
+"""The README's own code runs, and its files exist."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+
+def _block(readme: str, marker: str) -> str:
+    match = re.search(rf"<!-- {marker} -->\n```\w*\n(.*?)```", readme, re.DOTALL)
+    assert match, f"README.md has no code block under <!-- {marker} -->"
+    return match.group(1)
+
+
+def test_hello_world_runs_and_says_what_it_promises(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code = _block((root / "README.md").read_text(encoding="utf-8"), "hello-world")
+    assert len(code.splitlines()) <= 30
+    exec(compile(code, "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "AttitudeStatus.OK" in printed
+    assert "3.511" in printed, "the bound of the worked example in degrees"
+    assert "AttitudeStatus.INCONSISTENT" in printed
+    assert "((2,),)" in printed, "the third measurement is the one to drop"
+
+
+def test_the_two_commands_set_up_and_run(root: Path) -> None:
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    assert _block(readme, "main-command").rstrip().endswith("optsat demo")
+    assert _block(readme, "test-command").rstrip().endswith("-m pytest")
+
+
+def test_links_of_the_readme_exist(root: Path) -> None:
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    targets = [target for target in re.findall(r"\]\(([^)]+)\)", readme) if "://" not in target]
+    assert targets
+    missing = [target for target in targets if not (root / target).exists()]
+    assert not missing

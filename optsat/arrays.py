@@ -57,7 +57,8 @@ def _first_text(raw: NDArray[Any]) -> str:
     for index, item in np.ndenumerate(raw):
         if isinstance(item, str | bytes):
             place = tuple(int(i) for i in index)
-            return f": entry {place[0] if len(place) == 1 else place} is {item!r}"
+            where = f"entry {place[0] if len(place) == 1 else place} is " if place else ""
+            return f": {where}{str(item)!r}"
     return ""
 
 
@@ -67,12 +68,13 @@ def _check_shape(name: str, array: Array, shape: tuple[int | None, ...], unit: s
     )
     if fits:
         return
-    expected = (
-        "(" + ", ".join("m" if want is None else str(want) for want in shape) + ("," if len(shape) == 1 else "") + ")"
-    )
+    # the free axes are (m, ...) or (n, m, ...)
+    free = iter("nm"[-sum(want is None for want in shape) :])
+    sizes = ", ".join(next(free) if want is None else str(want) for want in shape)
+    expected = f"({sizes}{',' if len(shape) == 1 else ''})"
     hint = ""
-    if array.ndim == 2 and len(shape) == 2 and shape[1] == array.shape[0] and shape[1] != array.shape[1]:
-        hint = " Did you pass columns? Use `.T`."
+    if array.ndim == len(shape) >= 2 and shape[-1] == array.shape[-2] != array.shape[-1]:
+        hint = f" Did you pass columns? Use `{'.T' if array.ndim == 2 else 'numpy.swapaxes(..., -1, -2)'}`."
     raise InputError(f"`{name}` must have shape {expected} [{unit}], got {array.shape}.{hint}")
 
 

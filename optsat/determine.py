@@ -179,7 +179,8 @@ def _batch_bounds(value: ArrayLike, shape: tuple[int, ...]) -> Array:
     if np.any(eps < 0) or np.any(eps >= np.pi):
         index = tuple(int(i) for i in np.argwhere((eps < 0) | (eps >= np.pi))[0])
         hint = " This looks like degrees; use numpy.deg2rad." if eps[index] >= np.pi else ""
-        raise InputError(f"`angle_bound_rad` must be in [0, pi) [rad]: index {index} is {eps[index]:g}.{hint}")
+        where = f"index {index[0] if len(index) == 1 else index}" if index else "the value"
+        raise InputError(f"`angle_bound_rad` must be in [0, pi) [rad]: {where} is {eps[index]:g}.{hint}")
     return np.array(np.broadcast_to(eps, shape))
 
 

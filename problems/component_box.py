@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optsat.arrays import Array, Mask, finite_array
+from optsat.arrays import Array, Mask, angle_bounds, finite_array, normalise_rows
 from optsat.errors import InfeasibleBoxError, InputError
 
 _SLACK = 1e-12
@@ -74,7 +74,7 @@ class ComponentBox:
         InputError : fraction not in [0, 1), or an unknown mode.
         """
         x = finite_array("measured", measured, (None, 3))
-        if not 0 <= fraction < 1:
+        if isinstance(fraction, bool) or not isinstance(fraction, int | float) or not 0 <= fraction < 1:
             raise InputError(f"`fraction` must be in [0, 1), got {fraction!r}.")
         if mode == "paper":
             return ComponentBox(x - fraction * np.abs(x), x + fraction * np.abs(x))
@@ -182,13 +182,12 @@ def box_constraints(
         return b_B, r_N, angle_bound_rad, u, w, c  # type: ignore[return-value]
     b_mid = b_B.midpoint_directions() if isinstance(b_B, ComponentBox) else finite_array("b_B", b_B, (None, 3))
     r_mid = r_N.midpoint_directions() if isinstance(r_N, ComponentBox) else finite_array("r_N", r_N, (None, 3))
+    b_unit, r_unit = normalise_rows("b_B", b_mid), normalise_rows("r_N", r_mid)
     if len(b_mid) != len(r_mid):
         raise InputError(f"`b_B` and `r_N` must hold the same number of vectors, got {len(b_mid)} and {len(r_mid)}.")
-    extra = np.zeros(len(b_mid)) + finite_array("angle_bound_rad", 0.0 if angle_bound_rad is None else angle_bound_rad)
+    extra = angle_bounds("angle_bound_rad", 0.0 if angle_bound_rad is None else angle_bound_rad, len(b_mid))
     delta_b = b_B.cone_angles() if isinstance(b_B, ComponentBox) else np.zeros(len(b_mid))
     delta_r = r_N.cone_angles() if isinstance(r_N, ComponentBox) else np.zeros(len(r_mid))
-    b_unit = b_mid / np.linalg.norm(b_mid, axis=1, keepdims=True)
-    r_unit = r_mid / np.linalg.norm(r_mid, axis=1, keepdims=True)
     left, right, level = [u], [w], [c]
     for box, own, other, other_delta, mirrored in (
         (b_B, b_unit, r_unit, delta_r + extra, False),

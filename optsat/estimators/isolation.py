@@ -12,7 +12,7 @@ from optsat.attitude import quaternion
 from optsat.attitude.admissible_set import AdmissibleSet
 from optsat.attitude.status import AttitudeStatus
 from optsat.determine import certify_attitude
-from optsat.errors import InputError
+from optsat.errors import InputError, explain_unknown_options
 
 if TYPE_CHECKING:
     from optsat.problems.certified_attitude import CertifiedAttitude
@@ -40,6 +40,7 @@ class Isolation:
         return len(self.candidates) == 1
 
 
+@explain_unknown_options
 def isolate(
     b_B: ArrayLike,
     r_N: ArrayLike,

@@ -35,7 +35,7 @@ def directions(rng: np.random.Generator, *shape: int) -> Array:
 
 
 def tilted(rng: np.random.Generator, y: Array, half_angle: Array, boundary: bool) -> Array:
-    """Return unit vectors at most `half_angle` (...) from y (..., 3): on the rim of the cap, or uniform over its area."""
+    """Return unit vectors at most `half_angle` (...) from y (..., 3): on the rim of the cap, or uniform per area."""
     across = np.cross(y, directions(rng, *y.shape[:-1]))
     across /= np.linalg.norm(across, axis=-1, keepdims=True)
     share = np.ones(y.shape[:-1]) if boundary else rng.random(y.shape[:-1])

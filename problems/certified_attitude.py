@@ -111,8 +111,7 @@ class CertifiedAttitudeProblem:
     """Find the smallest ball of attitudes that surely holds the truth.
 
     b_B, r_N : (m, 3) directions, or a ComponentBox each; angle_bound_rad : (m,) or scalar, body and reference bounds
-    added,
-    in [0, pi) [rad]; may be None when a box is given (then it is what comes on top of the boxes: 0)
+    added, in [0, pi) [rad]; may be None when a box is given (then it is what comes on top of the boxes: 0)
     cuts : half-spaces u . A(q) w >= c as (u (k, 3), w (k, 3), c (k,))
 
     Raises

@@ -91,8 +91,7 @@ def repaired(
     """Return a level and multipliers whose every cell is proven with rounding allowed for; inf when that failed.
 
     An interior-point dual is not exactly feasible: what a cell lacks is put on the multiplier of the unit ball,
-    whose block is
-    positive definite, and what that costs in the corner is paid by the level.
+    whose block is positive definite, and what that costs in the corner is paid by the level.
     """
     multipliers = np.array(multipliers)
     level = tau * (1 + 1e-9) + 1e-12

@@ -75,8 +75,7 @@ class Wahba:
         """Return the attitude with its distance from the optimum recomputed from the vectors.
 
         Proof GLOBAL: the Newton step vanishes and the Hessian is positive (a strict local minimum of Wahba's loss is
-        global) or
-        flat; STATIONARY: the step vanishes elsewhere; FEASIBLE: a rotation that is not the optimum.
+        global) or flat; STATIONARY: the step vanishes elsewhere; FEASIBLE: a rotation that is not the optimum.
         """
         b, r, w = self.form.b_B, self.form.r_N, self.form.weights
         q_BN = np.asarray(point.x)

@@ -1,8 +1,7 @@
 """Smallest provable ball around an admissible set: the 4x4 semidefinite programme, scaled about a pivot attitude.
 
 With 1 - cos(eps) near 1e-9 the plain programme loses its digits; in Gibbs coordinates about a pivot, divided by the
-pivot's
-own radius, every number is of order one.
+pivot's own radius, every number is of order one.
 """
 
 from dataclasses import dataclass, field

@@ -95,7 +95,7 @@ def claims(figures: Mapping[str, float]) -> list[Claim]:
         judge_bar(
             f"{name}-containment",
             f"{name}: optical reference inside the bound in at least 99 % of the epochs [%]; median bound "
-            "{figures[f'{name}_bound_median_deg']:.1f} deg, refused samples "
+            f"{figures[f'{name}_bound_median_deg']:.1f} deg, refused samples "
             f"{figures['refused_samples_percent']:.1f} %",
             measured=figures[f"{name}_containment_percent"],
             holds=figures[f"{name}_containment_percent"] >= 99,

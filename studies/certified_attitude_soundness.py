@@ -1,8 +1,7 @@
 """Soundness of the guaranteed bound: random poses with errors up to the boundary of their cones; violations counted.
 
 Each case draws 700 two-vector poses (array path) and 350 poses of 3 to 8 vectors (optimised weights), half of them
-with every
-error on the boundary of its cone, a seventh with bounds of 1e-9 to 1e-6 rad, the rest of 1e-4 to 20 deg.
+with every error on the boundary of its cone, a seventh with bounds of 1e-9 to 1e-6 rad, the rest of 1e-4 to 20 deg.
 """
 
 from collections.abc import Mapping, Sequence
@@ -133,7 +132,7 @@ def claims(figures: Mapping[str, float]) -> list[Claim]:
     return [
         judge_bar(
             "no-violation",
-            "errors above the guaranteed bound in {figures['poses']:.0f} poses, "
+            f"errors above the guaranteed bound in {figures['poses']:.0f} poses, "
             f"{figures['many_vector_poses']:.0f} of them "
             "with optimised weights of three to eight vectors",
             measured=violations,

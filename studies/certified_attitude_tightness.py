@@ -1,8 +1,7 @@
 """Tightness of the guaranteed bound: against the smallest ball around boundary points found by brute force.
 
 The brute-force radius is found by shooting rays from an interior point at the boundary of the admissible set, more
-of them
-where the set reaches farthest; it is a lower bound of the true radius, so every ratio is an upper estimate.
+of them where the set reaches farthest; it is a lower bound of the true radius, so every ratio is an upper estimate.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,7 @@
 """Wahba's loss near an attitude, evaluated from the vectors so that weight ratios of 1e16 lose nothing.
 
 Eigenvectors of K and singular vectors of B lose the lighter vectors when the gap of K falls below rounding; the
-gradient
-and Hessian formed here, in a body basis whose first axis is the heaviest vector, do not.
+gradient and Hessian formed here, in a body basis whose first axis is the heaviest vector, do not.
 """
 
 from dataclasses import dataclass
@@ -49,8 +48,7 @@ def curvature(b_B: Array, r_N: Array, weights: Array, q_BN: Array) -> Curvature:
     """Return gradient, Hessian and Newton step of Wahba's loss at q_BN.
 
     Loss along [g; 1] (x) q: const - 2 g.sum w (b x y) + g^T H g + ..., H = sum w [2 (b.y) I - b y^T - y b^T], y =
-    A(q) r;
-    entries as (b x e_i).(y x e_j) + (y x e_i).(b x e_j), free of cancellation for vectors near an axis.
+    A(q) r; entries as (b x e_i).(y x e_j) + (y x e_i).(b x e_j), free of cancellation for vectors near an axis.
     """
     y = r_N @ rotation_matrix(q_BN).T
     basis = heaviest_first_basis(b_B, weights)
@@ -102,8 +100,7 @@ def polish(b_B: Array, r_N: Array, weights: Array, q_BN: Array, steps: int = 20)
     """Return q_BN refined by Newton steps on Wahba's loss, and the curvature there.
 
     A strict local minimum of Wahba's loss is its global minimum (stationary points are the eigenvectors of K), so a
-    Hessian
-    that is positive beyond its rounding error proves the answer.
+    Hessian that is positive beyond its rounding error proves the answer.
     """
     here = curvature(b_B, r_N, weights, q_BN)
     for _ in range(steps):

@@ -1,8 +1,7 @@
 """Gibbs chart: attitudes [s g; 1] (x) q about a pivot q, with the radius of interest scaled to |g| = 1.
 
 In this chart every constraint is a quadratic f(g) = a + 2 h.g + g^T G g and every number is of order one, whatever
-the size
-of the errors. A ball about the attitude at g = c is {g : N(g) <= tau D(g)} with tan^2(theta / 2) = s^2 tau,
+the size of the errors. A ball about the attitude at g = c is {g : N(g) <= tau D(g)} with tan^2(theta / 2) = s^2 tau,
 N(g) = |g - c|^2 + s^2 (|g|^2 |c|^2 - (g.c)^2), D(g) = (1 + s^2 g.c)^2. The chart is gnomonic: a ball below pi is
 convex in it.
 """
@@ -113,10 +112,9 @@ def smallest_ball(g: Array, scale: float, iterations: int = 1000, tolerance: flo
     """Return the chart point (3,) that minimises the largest angle to points g (k, 3).
 
     The smallest cap on the sphere of quaternions is cut by the smallest Euclidean ball around them; its dual weights
-    are found
-    by pairwise Frank-Wolfe steps, from the nearest support point to the farthest point, until the squared radius is
-    known to
-    the relative tolerance. Coordinates are taken about the pivot and divided by `scale`, so small sets lose no digits.
+    are found by pairwise Frank-Wolfe steps, from the nearest support point to the farthest point, until the squared
+    radius is known to the relative tolerance. Coordinates are taken about the pivot and divided by `scale`, so small
+    sets lose no digits.
     """
     square = np.sum(g * g, axis=1)
     n = np.sqrt(1 + scale**2 * square)

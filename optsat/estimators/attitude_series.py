@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from optsat.arrays import Array
 from optsat.attitude import quaternion
 from optsat.attitude.status import AttitudeStatus
-from optsat.determine import certify_attitude
+from optsat.determine import certify_attitude, certify_attitude_batch
 from optsat.errors import InputError
 from optsat.estimators.relative_attitude import RelativeAttitude
 from optsat.records.record import Record
@@ -85,11 +85,10 @@ def certify_record(
     """Return certified attitudes of every epoch of a record.
 
     Without a window each epoch stands alone. With one, every accepted past pair is carried to the present by the
-    gyro and its
-    bound is widened by what the gyro's own bound allows: |rotation error| <= integral of |rate error|.
+    gyro and its bound is widened by what the gyro's own bound allows: |rotation error| <= integral of |rate error|.
 
     progress : called with (epochs done, epochs in all)
-    every : determine every so-manieth epoch of the record; the gyro between them is used all the same
+    every : determine every n-th epoch of the record; the gyro samples between them are used all the same
 
     Raises
     ------
@@ -106,7 +105,13 @@ def certify_record(
     status, used = np.full(count, -1, dtype=np.int8), np.zeros(count, dtype=np.int64)
     rejected = np.zeros((count, len(names)), dtype=bool)
     history = History(record, window, relative) if window is not None and relative is not None else None
+    done = np.zeros(count, dtype=bool)
+    if history is None:
+        # epochs of two directions need no history and run as whole arrays
+        done = _fill_two_vector_epochs(record, epochs, q_BN, bound, status, used)
     for row, k in enumerate(epochs):
+        if done[row]:
+            continue
         present = np.array([i for i, channel in enumerate(record.channels) if channel.valid[k]], dtype=np.int64)
         result, left_out, pairs = _epoch(record, k, present, history)
         rejected[row, left_out] = True
@@ -115,7 +120,36 @@ def certify_record(
             q_BN[row], bound[row], status[row] = result
         if progress is not None:
             progress(row + 1, count)
+    if progress is not None:
+        progress(count, count)
     return AttitudeSeries(record.t[::every], q_BN, bound, status, used, rejected, names, window is not None)
+
+
+def _fill_two_vector_epochs(
+    record: Record,
+    epochs: range,
+    q_BN: Array,
+    bound: Array,
+    status: NDArray[np.int8],
+    used: NDArray[np.int64],
+) -> NDArray[np.bool_]:
+    """Write the epochs with exactly two valid directions into the result arrays; return which they are (count,)."""
+    if len(record.channels) < 2:
+        return np.zeros(len(epochs), dtype=bool)
+    rows = np.array(epochs, dtype=np.int64)
+    valid = np.stack([channel.valid[rows] for channel in record.channels], axis=1)
+    double = valid.sum(axis=1) == 2
+    if not double.any():
+        return np.asarray(double)
+    which = np.argsort(~valid[double], axis=1, kind="stable")[:, :2]
+    place = (rows[double][:, None], which)
+    b_B, r_N, eps = (
+        np.stack([getattr(channel, name) for channel in record.channels], axis=1)[place]
+        for name in ("b_B", "r_N", "angle_bound_rad")
+    )
+    batch = certify_attitude_batch(b_B, r_N, eps)
+    q_BN[double], bound[double], status[double], used[double] = batch.q_BN, batch.bound_rad, batch.status_index, 2
+    return np.asarray(double)
 
 
 _Result = tuple[Array, float, int]

@@ -20,8 +20,7 @@ class RelativeAttitude:
     """Attitude of every epoch relative to the first, and how far its error may have grown.
 
     q_BkB0 (T, 4) : the product of the steps; growth_rad (T,) : accumulated bound [rad]; segment (T,) : epochs that
-    an unbroken
-    gyro connects share a number
+    an unbroken gyro connects share a number
     """
 
     q_BkB0: Array
@@ -34,8 +33,7 @@ class RelativeAttitude:
 
         The growth of a step dt is dt times the larger rate bound plus twice the leading integration error
         dt^3 (|omega''| / 12 + |omega| |omega'| / 12), its derivatives from differences of the samples: the rate is
-        taken to be
-        smooth between samples, which no log can prove.
+        taken to be smooth between samples, which no log can prove.
 
         Raises
         ------

@@ -1,6 +1,6 @@
 """optsat: attitude software that can be trusted in flight, from one symbolic description of a spacecraft.
 
-Importing this package loads NumPy at most; every public name but `solve` loads its own module on first use.
+Importing this package loads no other; every public name but `solve` loads its own module on first use.
 """
 
 import importlib

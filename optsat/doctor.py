@@ -123,6 +123,27 @@ def _clarabel_solves() -> Finding:
     return _judge("self-check clarabel", "the least x + y on the unit disc", least, -(2**0.5))
 
 
+def _attitude_certified() -> Finding:
+    try:
+        import numpy as np
+
+        from optsat.determine import certify_attitude
+
+        axes = np.eye(3)
+        attitude = certify_attitude(axes, axes, 0.01)
+        verdict = attitude.certificate.verify()
+    except (ImportError, RuntimeError) as error:
+        return Finding("self-check certified attitude", Health.BROKEN, str(error))
+    if not verdict:
+        return Finding("self-check certified attitude", Health.BROKEN, f"certificate rejected: {verdict.reason}")
+    # three orthogonal cones with equal weights: s1 = 1 - cos(eps), s2 = -1/3 - cos(eps)
+    versine = 2 * np.sin(0.005) ** 2
+    exact = float(2 * np.arctan(np.sqrt(versine / (4 / 3 - versine))))
+    return _judge(
+        "self-check certified attitude", "the bound [rad] of three axes within 0.01", attitude.bound_rad, exact
+    )
+
+
 def _judge(subject: str, what: str, got: float, exact: float) -> Finding:
     if abs(got - exact) < 1e-6:
         return Finding(subject, Health.OK, f"{what} is {exact:.6g}")
@@ -130,4 +151,8 @@ def _judge(subject: str, what: str, got: float, exact: float) -> Finding:
 
 
 # each takes well below a second; a check reports what it cannot do, it never raises
-SELF_CHECKS: tuple[Callable[[], Finding], ...] = (_casadi_computes, _clarabel_solves)
+SELF_CHECKS: tuple[Callable[[], Finding], ...] = (
+    _casadi_computes,
+    _clarabel_solves,
+    _attitude_certified,
+)

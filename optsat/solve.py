@@ -1,10 +1,13 @@
 """The one verb: lower a problem to a form, run the first solver that accepts it, interpret the point."""
 
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from optsat.errors import UnsupportedFormError
-from optsat.forms import Point
-from optsat.solution import Solution
+
+if TYPE_CHECKING:
+    # the verb is a public name, so importing optsat imports this module: it must not bring NumPy along
+    from optsat.forms import Point
+    from optsat.solution import Solution
 
 A = TypeVar("A")
 
@@ -16,7 +19,7 @@ class Problem(Protocol[A]):
         """Return one of the forms of `optsat.forms`."""
         ...
 
-    def interpret(self, point: Point, solver: str) -> Solution[A]:
+    def interpret(self, point: "Point", solver: str) -> "Solution[A]":
         """Turn a solver's point into an answer, with residuals recomputed from the problem."""
         ...
 
@@ -33,12 +36,12 @@ class Solver(Protocol):
         """Return whether `run` can take this form."""
         ...
 
-    def run(self, form: object, start: Point | None = None) -> Point:
+    def run(self, form: object, start: "Point | None" = None) -> "Point":
         """Solve the form."""
         ...
 
 
-def solve(problem: Problem[A], solver: Solver | None = None, start: Point | None = None) -> Solution[A]:
+def solve(problem: Problem[A], solver: Solver | None = None, start: "Point | None" = None) -> "Solution[A]":
     """Return the solution of `problem` by `solver`, or by the first solver of the ordered table that accepts its form.
 
     Raises

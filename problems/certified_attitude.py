@@ -38,7 +38,8 @@ class CertifiedAttitude:
     INCONSISTENT
     status : OK | UNBOUNDED | INCONSISTENT; termination, proof : why the solver stopped, what is proven
     weights (m,) : of the measurements, sum 1
-    unobservable_axis_B (3,) : axis of the free rotation, when UNBOUNDED by geometry
+    unobservable_axis_B (3,) : when UNBOUNDED, the axis of the rotation that geometry leaves free or the bounds confine
+    least; None where more than one rotation is free
     inconsistent_pairs : index pairs whose mutual angle contradicts their bounds; suspects : indices that the proof
     rests on
     certificate : re-checks the claim without a solver
@@ -98,10 +99,10 @@ class CertifiedAttitude:
     def message(self) -> str:
         """Return the result in one sentence."""
         if self.status is AttitudeStatus.UNBOUNDED and self.unobservable_axis_B is not None:
-            axis = np.array2string(self.unobservable_axis_B, precision=4)
+            axis = np.array2string(self.unobservable_axis_B, precision=4, suppress_small=True)
             return (
                 f"Attitude not observable: the rotation about {axis} in B is undetermined. "
-                "Add a direction off that axis."
+                "Add a direction off that axis, or tighter bounds."
             )
         return self.certificate.claim
 
@@ -191,7 +192,10 @@ class CertifiedAttitudeProblem:
             if len(here.free_axes_B):
                 q_BN = canonical(smallest_rotation(certificate.q_BN, here.free_axes_B))
                 certificate = replace(certificate, q_BN=q_BN)
-            axis = here.free_axes_B[0] if len(here.free_axes_B) == 1 else None
+            # the axis that geometry leaves free, or the one that the bounds confine least
+            weakest = np.linalg.eigh(sum_about(data, certificate.weights, certificate.q_BN).C)[1][:, 0]
+            axis = here.free_axes_B[0] if len(here.free_axes_B) == 1 else weakest
+            axis = None if len(here.free_axes_B) > 1 else axis * (1.0 if axis[np.argmax(np.abs(axis))] > 0 else -1.0)
         contradicting = self.contradicting
         if contradicting:
             certificate = replace(certificate, status=AttitudeStatus.INCONSISTENT, bound_rad=0.0, pair=contradicting[0])

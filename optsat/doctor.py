@@ -129,19 +129,17 @@ def _attitude_certified() -> Finding:
 
         from optsat.determine import certify_attitude
 
-        axes = np.eye(3)
+        axes = np.eye(3)[:2]
         attitude = certify_attitude(axes, axes, 0.01)
         verdict = attitude.certificate.verify()
     except (ImportError, RuntimeError) as error:
         return Finding("self-check certified attitude", Health.BROKEN, str(error))
     if not verdict:
         return Finding("self-check certified attitude", Health.BROKEN, f"certificate rejected: {verdict.reason}")
-    # three orthogonal cones with equal weights: s1 = 1 - cos(eps), s2 = -1/3 - cos(eps)
+    # two orthogonal cones with equal weights: s1 = 1 - cos(eps), s2 = -cos(eps)
     versine = 2 * np.sin(0.005) ** 2
-    exact = float(2 * np.arctan(np.sqrt(versine / (4 / 3 - versine))))
-    return _judge(
-        "self-check certified attitude", "the bound [rad] of three axes within 0.01", attitude.bound_rad, exact
-    )
+    exact = float(2 * np.arctan(np.sqrt(versine / (1 - versine))))
+    return _judge("self-check certified attitude", "the bound [rad] of two axes within 0.01", attitude.bound_rad, exact)
 
 
 def _judge(subject: str, what: str, got: float, exact: float) -> Finding:

@@ -74,6 +74,8 @@ class CertifiedAttitude:
         ------
         InputError : the attitude is not OK (no covariance exists), or sigma_rad cannot be used.
         """
+        if self.status is not AttitudeStatus.OK:
+            raise InputError(f"The covariance does not exist. {self.message()}")
         data = self.certificate.admissible
         sigma = data.angle_bound_rad / 2 if sigma_rad is None else sigma_rad
         return attitude_covariance(data.b_B, self.weights, sigma)
@@ -195,7 +197,7 @@ class CertifiedAttitudeProblem:
             # the axis that geometry leaves free, or the one that the bounds confine least
             weakest = np.linalg.eigh(sum_about(data, certificate.weights, certificate.q_BN).C)[1][:, 0]
             axis = here.free_axes_B[0] if len(here.free_axes_B) == 1 else weakest
-            axis = None if len(here.free_axes_B) > 1 else axis * (1.0 if axis[np.argmax(np.abs(axis))] > 0 else -1.0)
+            axis = None if len(here.free_axes_B) > 1 else np.sign(axis[np.argmax(np.abs(axis))]) * axis + 0.0
         contradicting = self.contradicting
         if contradicting:
             certificate = replace(certificate, status=AttitudeStatus.INCONSISTENT, bound_rad=0.0, pair=contradicting[0])

@@ -202,7 +202,7 @@ RULES: dict[str, tuple[Rule, Tree]] = {
     ),
     "plots import only estimators, records, arrays and errors": (
         only("plots", {"estimators", "records", "arrays", "errors"}),
-        {"optsat.plots.bound_figure": "from optsat.campaign.store import write_atomically"},
+        {"optsat.plots.bound_figure": "from optsat.files import write_atomically"},
     ),
     "attitude imports only arrays and errors": (
         only("attitude", {"arrays", "errors"}),

@@ -14,6 +14,7 @@ from typing import Any
 from optsat._version import __version__
 from optsat.campaign.result import StudyResult
 from optsat.campaign.threads import THREAD_VARIABLES
+from optsat.files import write_atomically
 
 
 def write_result(result: StudyResult, folder: Path, command: Sequence[str]) -> None:
@@ -42,25 +43,6 @@ def provenance(command: Sequence[str]) -> dict[str, Any]:
         "threads": {name: os.environ.get(name) for name in THREAD_VARIABLES},
         "command": list(command),
     }
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that whoever reads it, even after a power cut, finds the old bytes or the new."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with temporary.open("wb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
 
 
 def _rows_as_csv(result: StudyResult) -> str:

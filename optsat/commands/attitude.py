@@ -54,10 +54,10 @@ def attitude_command(
     as_json: AsJson = False,
 ) -> None:
     """Determine the attitude of every epoch of a log. Exit code 1 for bad rows or measurements that contradict."""
-    from optsat.campaign.store import write_atomically
     from optsat.estimators.attitude_series import certify_record
     from optsat.estimators.series_csv import series_csv
     from optsat.estimators.series_report import report_series
+    from optsat.files import write_atomically
 
     memory = _window(window, spacing)
     if certificates is not None and memory is not None:

@@ -38,10 +38,10 @@ def demo_command(
     """
     import numpy as np
 
-    from optsat.campaign.store import write_atomically
     from optsat.estimators.attitude_series import Window, certify_record
     from optsat.estimators.series_csv import series_csv
     from optsat.estimators.series_report import report_series
+    from optsat.files import write_atomically
     from optsat.records.csv_log import read_csv_log, write_csv_log
     from optsat.simulation.scenario_file import example_text, parse_scenario, read_text
 
@@ -151,7 +151,7 @@ def _figure(value: float | None) -> str:
 
 
 def _draw(record: "Record", series: "dict[str, AttitudeSeries]", reports: "dict[str, SeriesReport]", out: Path) -> None:
-    from optsat.campaign.store import write_atomically
+    from optsat.files import write_atomically
     from optsat.plots.bound_figure import FORMATS, bound_figure, rendered, shades_of
 
     title = "\n".join(f"{name.capitalize()}: {finding(report)}" for name, report in reports.items())

@@ -5,13 +5,13 @@ import io
 import json
 import math
 import os
-import secrets
 from collections.abc import Mapping
 from pathlib import Path
 
 from numpy.typing import ArrayLike
 
 from optsat.arrays import Array, finite_array
+from optsat.files import write_atomically
 from optsat.records.csv_layout import MAGIC
 from optsat.records.record import Record, VectorChannel
 
@@ -37,7 +37,7 @@ def write_csv_log(path: str | os.PathLike[str], record: Record, frames: Mapping[
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(columns)
     rows.writerows(zip(*(map(_cell, values.tolist()) for values in columns.values()), strict=True))
-    _replace(Path(path), text.getvalue().encode())
+    write_atomically(Path(path), text.getvalue().encode())
 
 
 def _metadata(record: Record, rotations: Mapping[str, Array]) -> list[str]:
@@ -81,16 +81,3 @@ def _vector_columns(channel: VectorChannel, rotations: Mapping[str, Array]) -> d
 
 def _cell(value: float) -> str:
     return repr(value) if math.isfinite(value) else ""
-
-
-def _replace(path: Path, data: bytes) -> None:
-    """Write beside the target and rename, so that a reader or a power cut never meets half a file."""
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
-    try:
-        with open(temporary, "xb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -9,7 +9,8 @@ import toy_study
 
 from optsat import _version
 from optsat.campaign.runner import run_study
-from optsat.campaign.store import write_atomically, write_result
+from optsat.campaign.store import write_result
+from optsat.files import write_atomically
 
 
 def test_a_result_can_be_read_back(tmp_path: Path) -> None:

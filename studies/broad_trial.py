@@ -116,8 +116,9 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     for name, colour in (("plain", "#999999"), ("certified", "#56B4E9"), ("windowed", "#E69F00")):
         upper.plot(t, _shown(rows, f"{name}_deg"), ".", ms=2.5, color=colour, label=f"{name}: error")
     upper.set(yscale="log", ylabel="attitude angle [deg]", ylim=(0.05, 200))
-    upper.set_title("BROAD trial 01: error against the optical reference stays below the guaranteed bound")
-    upper.legend(frameon=False, ncols=3, fontsize=8, loc="lower right")
+    inside = metrics(rows)["certified_containment_percent"]
+    upper.set_title(f"BROAD trial 01: {inside:.1f} % of the errors lie within the guaranteed bound")
+    upper.legend(frameon=False, ncols=5, fontsize=8, loc="upper center")
     lower.plot(t, [row["rate_deg_s"] for row in rows], color="#333333", lw=0.8)
     lower.set(xlabel="time [s]", ylabel="rate [deg/s]")
     canvas.savefig(path)

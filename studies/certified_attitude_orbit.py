@@ -186,8 +186,8 @@ def figure(rows: Sequence[Row], path: Path) -> None:
             level = [shown[f"epoch{e + 1}_{bound}"] for e in epochs]
             axes.hlines(level, x - 0.09, x + 0.09, color=colour, linewidth=2.5)
     axes.set_xticks(range(len(epochs)), [f"epoch JD {JULIAN_DATES[e]:.1f}" for e in epochs])
-    axes.set_ylabel("RMS attitude error [deg] (line: RMS guaranteed bound)")
-    axes.set_title("Memory halves the error many times over; weights alone do not")
+    axes.set_ylabel("RMS angle [deg]")
+    axes.set_title("RMS attitude error (bars) and RMS guaranteed bound (lines)")
     axes.legend(frameon=False, ncols=2, loc="upper left", bbox_to_anchor=(0, -0.08))
     canvas.savefig(path)
 

@@ -2,13 +2,28 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from optsat.arrays import Array
 from optsat.attitude.admissible_set import AdmissibleSet
+from optsat.errors import UnsupportedFormError
 from optsat.solution import Termination
+
+F = TypeVar("F")
+
+
+def required(form: object, kind: type[F], solver: str) -> F:
+    """Return the form when it is of the kind that a solver takes.
+
+    Raises
+    ------
+    UnsupportedFormError : it is another.
+    """
+    if not isinstance(form, kind):
+        raise UnsupportedFormError(f"{solver} solves {kind.__name__}, got {type(form).__name__}. See optsat.solvers.")
+    return form
 
 
 @dataclass(frozen=True)

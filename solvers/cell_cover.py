@@ -16,7 +16,7 @@ from optsat.attitude.gibbs_chart import (
     slab_matrices,
     smallest_ball,
 )
-from optsat.forms import ConeKind, ConicForm, CoverForm, Point, symmetric_vector
+from optsat.forms import ConeKind, ConicForm, CoverForm, Point, required, symmetric_vector
 from optsat.solution import Termination
 from optsat.solvers.clarabel import Clarabel
 
@@ -42,7 +42,7 @@ class CellCoverSolver:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return the centre (`x`, chart point) and the cells: `stats` low, high, multipliers, tau, sampled."""
-        assert isinstance(form, CoverForm)
+        form = required(form, CoverForm, self.name)
         chart = GibbsChart.about(form.admissible, form.q_BN, form.scale)
         centre, sampled = sampled_ball(chart, self.rays)
         target = max(sampled, 1e-6)

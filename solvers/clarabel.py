@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from optsat.arrays import Array
-from optsat.forms import ConicForm, Point
+from optsat.forms import ConicForm, Point, required
 from optsat.solution import Termination
 
 _TERMINATION = {
@@ -81,7 +81,7 @@ class Clarabel:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Solve the conic form; `stats["status"]` keeps the solver's own word."""
-        assert isinstance(form, ConicForm)
+        form = required(form, ConicForm, self.name)
         library, kinds = _library(), _cone_kinds()
         settings = library.DefaultSettings()
         settings.verbose = False

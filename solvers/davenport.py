@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from optsat.attitude.alignment import polish, starting_weights
 from optsat.attitude.davenport import davenport_matrix, dominant_quaternion
-from optsat.forms import AlignmentForm, Point
+from optsat.forms import AlignmentForm, Point, required
 from optsat.solvers.alignment_point import alignment_point
 
 
@@ -24,7 +24,7 @@ class Davenport:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return q_BN of the least weighted loss."""
-        assert isinstance(form, AlignmentForm)
+        form = required(form, AlignmentForm, self.name)
         mild = starting_weights(form.weights)
         q_BN = dominant_quaternion(davenport_matrix(form.b_B, form.r_N, mild))
         return alignment_point(form, *polish(form.b_B, form.r_N, form.weights, q_BN))

@@ -14,7 +14,7 @@ from optsat.attitude.admissible_set import AdmissibleSet
 from optsat.attitude.davenport import davenport_matrix, dominant_quaternion
 from optsat.attitude.gibbs_chart import GibbsChart
 from optsat.errors import InputError
-from optsat.forms import ConeKind, ConicForm, EnclosureForm, Point, symmetric_vector
+from optsat.forms import ConeKind, ConicForm, EnclosureForm, Point, required, symmetric_vector
 from optsat.solution import Termination
 from optsat.solvers.clarabel import Clarabel
 
@@ -45,7 +45,7 @@ class ScaledSemidefinite:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return weights (`dual`, sum 1) and their Davenport attitude (`x`); `stats["candidates"]` holds every pass."""
-        assert isinstance(form, EnclosureForm)
+        form = required(form, EnclosureForm, self.name)
         admissible = form.admissible
         weights = pivot_weights(admissible) if start is None else start.dual
         candidates, iterations = [weights], 0

@@ -7,7 +7,7 @@ import numpy as np
 from optsat.arrays import Array
 from optsat.attitude.gibbs_chart import GibbsChart, fibonacci_directions, smallest_ball
 from optsat.attitude.subpaving import CORNERS, chart_point, farthest_level, remaining_cells
-from optsat.forms import CoverForm, Point
+from optsat.forms import CoverForm, Point, required
 from optsat.solution import Termination
 
 
@@ -24,7 +24,7 @@ class SubpavingSolver:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return the centre (`x`, quaternion) and in `stats` the second ball and the bound."""
-        assert isinstance(form, CoverForm)
+        form = required(form, CoverForm, self.name)
         chart = GibbsChart.about(form.admissible, form.q_BN, form.scale)
         centres, half = remaining_cells(chart, self.levels[0])
         second, second_scale = None, 0.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from optsat.attitude.alignment import polish, starting_weights
 from optsat.attitude.davenport import quaternion_from_dcm
-from optsat.forms import AlignmentForm, Point
+from optsat.forms import AlignmentForm, Point, required
 from optsat.solvers.alignment_point import alignment_point
 
 
@@ -22,7 +22,7 @@ class SingularValues:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return q_BN of the least weighted loss."""
-        assert isinstance(form, AlignmentForm)
+        form = required(form, AlignmentForm, self.name)
         B = np.einsum("m,mi,mj->ij", starting_weights(form.weights), form.b_B, form.r_N)
         left, _, right = np.linalg.svd(B)
         rotation = left @ np.diag((1.0, 1.0, np.linalg.det(left) * np.linalg.det(right))) @ right

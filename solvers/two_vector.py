@@ -7,7 +7,7 @@ import numpy as np
 from optsat.attitude.davenport import quaternion_from_dcm
 from optsat.attitude.two_vector import collinear, wahba_dcm
 from optsat.errors import InputError
-from optsat.forms import AlignmentForm, Point
+from optsat.forms import AlignmentForm, Point, required
 from optsat.solution import Termination
 
 
@@ -27,7 +27,7 @@ class TwoVector:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return q_BN of the least weighted loss."""
-        assert isinstance(form, AlignmentForm)
+        form = required(form, AlignmentForm, self.name)
         rotation = wahba_dcm(form.b_B, form.r_N, form.weights)
         return Point(x=quaternion_from_dcm(rotation), dual=np.zeros(0), termination=Termination.CONVERGED)
 
@@ -53,7 +53,7 @@ class Triad:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return q_BN that maps the primary reference direction onto its measurement."""
-        assert isinstance(form, AlignmentForm)
+        form = required(form, AlignmentForm, self.name)
         primary = int(np.argmax(form.weights)) if self.primary is None else self.primary
         weights = np.zeros(2)
         weights[primary] = 1.0

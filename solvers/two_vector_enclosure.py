@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from optsat.attitude.davenport import quaternion_from_dcm
 from optsat.attitude.two_vector import best_weights, collinear, wahba_dcm
-from optsat.forms import EnclosureForm, Point
+from optsat.forms import EnclosureForm, Point, required
 from optsat.solution import Termination
 
 
@@ -24,7 +24,7 @@ class TwoVectorEnclosure:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return the optimal weights (`dual`) and their Davenport attitude (`x`)."""
-        assert isinstance(form, EnclosureForm)
+        form = required(form, EnclosureForm, self.name)
         known = form.admissible
         weights = best_weights(known.b_B, known.r_N, known.angle_bound_rad)
         q_BN = quaternion_from_dcm(wahba_dcm(known.b_B, known.r_N, weights))

@@ -32,9 +32,15 @@ class RefinedEnclosure:
     def interpret(self, point: Point, solver: str) -> Solution[CertifiedAttitude]:
         """Return the refined answer where its certificate verifies and its bound is smaller, else the first one."""
         refined = self._cells(point) if "tau" in point.stats else self._subpaving(point)
-        stats = {**self.first.stats, "refinement": solver, "order_1_bound_rad": self.first.bound_rad}
+        better = refined is not None and refined.bound_rad < self.first.bound_rad and bool(refined.verify())
+        stats = {
+            **self.first.stats,
+            "refinement": solver,
+            "refined": better,
+            "order_1_bound_rad": self.first.bound_rad,
+        }
         answer = replace(self.first, stats=stats)
-        if refined is not None and refined.bound_rad < self.first.bound_rad and refined.verify():
+        if refined is not None and better:
             answer = replace(
                 answer,
                 q_BN=refined.q_BN,

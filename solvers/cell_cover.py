@@ -96,10 +96,11 @@ class CellCoverSolver:
         farthest = float(np.max(ball_levels(corners, centre, chart.scale)))
         if np.all(np.isfinite(point.x)) and point.x[0] < farthest:
             return float(max(point.x[0], target)), np.maximum(point.x[1:], 0.0)
-        # the programme failed: the slabs alone prove the farthest corner
+        # the programme failed: each slab by itself proves its farther face, exactly so at these multipliers
+        half = (high - low) / 2
         fallback = np.zeros(count)
-        fallback[-4:-1] = 1 + chart.scale**2 * (farthest + float(centre @ centre))
-        return farthest, fallback
+        fallback[-4:-1] = 1 + np.abs((low + high) / 2 - centre) / half
+        return farthest, fallback * (1 + chart.scale**2 * (farthest + float(centre @ centre)))
 
 
 def sampled_ball(chart: GibbsChart, rays: int) -> tuple[Array, float]:

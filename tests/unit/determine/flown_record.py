@@ -35,7 +35,7 @@ def channel(name: str, q_BN: Array, r_N: Array, eps: float, rng: np.random.Gener
     y = dcm.from_quaternion(q_BN) @ r_N
     across = np.cross(y, rng.standard_normal(y.shape))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    fields = {
+    fields: dict[str, Any] = {
         "b_B": np.cos(0.95 * eps) * y + np.sin(0.95 * eps) * across,
         "r_N": np.broadcast_to(r_N, y.shape),
         "angle_bound_rad": np.full(len(y), eps),
@@ -49,9 +49,9 @@ def flight(
 ) -> Record:
     """Return a record of `count` epochs with a sun sensor, a magnetometer and a gyro of constant bias."""
     rng = np.random.default_rng(0)
-    t = dt * np.arange(count)
+    t = dt * np.arange(float(count))
     q_BN = attitude(t)
-    fields = {
+    fields: dict[str, Any] = {
         "channels": (
             channel("sun", q_BN, R_SUN, EPS_SUN, rng),
             channel("mag", q_BN, R_MAG, EPS_MAG, rng),

@@ -147,7 +147,7 @@ def test_an_empty_past_and_no_channels() -> None:
 
 
 def test_a_contradiction_without_a_past_is_reported() -> None:
-    """In the first frame there is nothing to appeal to: no channel is blamed, and the next sound frame starts afresh."""
+    """Without a past there is nothing to appeal to: every frame is inconsistent, and no channel is blamed."""
     record = with_fault(first=0)
     series = optsat.certify_record(record, WINDOW)
     assert series.counts()["inconsistent"] == 20
@@ -177,6 +177,7 @@ def test_every_nth_epoch_and_progress() -> None:
     assert [done for done, _ in seen[:7]] == list(range(1, 8))
     assert record.q_BN_true is not None
     assert np.all(series.error_rad(record.q_BN_true[::3]) <= series.bound_rad)
-    for every in (0, -1, 1.5, True):
+    wrong: list[Any] = [0, -1, 1.5, True]
+    for every in wrong:
         with pytest.raises(InputError, match="`every` must be a whole number >= 1"):
             optsat.certify_record(record, every=every)

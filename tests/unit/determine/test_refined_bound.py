@@ -43,7 +43,7 @@ def farthest_admissible(data: AdmissibleSet, q_BN: Array, reach: float, seed: in
         value = np.where(value < 0, value, quaternion.error_angle(moved, q_BN))
         better = value > best
         walkers, best = np.where(better[:, None], moved, walkers), np.where(better, value, best)
-    return walkers[best > 0]
+    return np.asarray(walkers[best > 0])
 
 
 @pytest.mark.parametrize("refine", ["cells", "subpaving"])

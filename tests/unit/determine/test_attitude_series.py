@@ -7,7 +7,7 @@ import pytest
 from flown_record import EPS_MAG, R_MAG, attitude, channel, flight
 
 import optsat
-from optsat.arrays import Array
+from optsat.arrays import Mask
 from optsat.attitude import dcm
 from optsat.errors import InputError
 from optsat.estimators.attitude_series import AttitudeSeries
@@ -16,7 +16,7 @@ from optsat.records.record import Record, VectorChannel
 WINDOW = optsat.Window(length_s=8.0, spacing_s=1.0)
 
 
-def held(series: AttitudeSeries, record: Record) -> Array:
+def held(series: AttitudeSeries, record: Record) -> Mask:
     """Return whether each determined epoch's error is within its bound (n,)."""
     assert record.q_BN_true is not None
     known = np.isfinite(series.error_rad(record.q_BN_true))

@@ -17,18 +17,19 @@ POSES = np.stack((PAIR, PAIR, PAIR))
 BOX = optsat.ComponentBox.from_half_width(PAIR, 0.02)
 
 Call = Callable[..., Any]
+BOUND: dict[str, Any] = {"angle_bound_rad": 0.1}
 
 
 def certify(b_B: Any, r_N: Any, **options: Any) -> Any:
-    return optsat.certify_attitude(b_B, r_N, **({"angle_bound_rad": 0.1} | options))
+    return optsat.certify_attitude(b_B, r_N, **(BOUND | options))
 
 
 def certify_batch(b_B: Any, r_N: Any, **options: Any) -> Any:
-    return optsat.certify_attitude_batch(b_B, r_N, **({"angle_bound_rad": 0.1} | options))
+    return optsat.certify_attitude_batch(b_B, r_N, **(BOUND | options))
 
 
 def isolate(b_B: Any, r_N: Any, **options: Any) -> Any:
-    return optsat.isolate(b_B, r_N, **({"angle_bound_rad": 0.1} | options))
+    return optsat.isolate(b_B, r_N, **(BOUND | options))
 
 
 def refused(expected: str, call: Call, *args: Any, **options: Any) -> str:

@@ -13,7 +13,7 @@ from optsat.attitude.alignment import curvature, smallest_rotation
 from optsat.attitude.covariance import attitude_covariance
 from optsat.attitude.davenport import canonical, rotation_matrix
 from optsat.attitude.status import AttitudeStatus
-from optsat.certificates.attitude_bound import Ball, best_centre, ellipsoid, sum_about
+from optsat.certificates.attitude_bound import Ball, ball_of, centred_sum, ellipsoid, sum_about
 from optsat.certificates.attitude_certificate import AttitudeCertificate
 from optsat.errors import InputError
 from optsat.forms import EnclosureForm, Point
@@ -179,11 +179,11 @@ class CertifiedAttitudeProblem:
     def _certificate(self, weights: Array) -> tuple[AttitudeCertificate, Ball]:
         """Return the certificate of the weights, its bound bit for bit what `verify` will recompute."""
         weights = weights / weights.sum()
-        q_BN = canonical(best_centre(self.admissible, weights))
-        draft = AttitudeCertificate(self.admissible, weights, q_BN, np.pi, AttitudeStatus.UNBOUNDED)
-        ball = draft.ball()
+        # divided by its sum once more, as `verify` will; q and -q have the same matrix to the last bit
+        total = centred_sum(self.admissible, weights / weights.sum())
+        ball = ball_of(total)
         bound = 0.0 if bool(ball.empty) else float(ball.bound_rad)
-        return replace(draft, bound_rad=bound, status=ball.status), ball
+        return AttitudeCertificate(self.admissible, weights, canonical(total.q_BN), bound, ball.status), ball
 
     def _answer(self, point: Point, certificate: AttitudeCertificate, ball: Ball) -> CertifiedAttitude:
         data = self.admissible

@@ -110,7 +110,10 @@ def _radius_in(chart: GibbsChart, weights: Array) -> float:
 def _solve_about(chart: GibbsChart, conic: Clarabel) -> tuple[Point, Array | None]:
     """Return the solver's point and the weights of all constraints (sum 1), None where it gave none."""
     keep = _active(chart)
-    point = conic.run(_programme(chart.a[keep], chart.h[keep], chart.G[keep], chart.scale**2))
+    a, h, G = chart.a, chart.h, chart.G
+    if not keep.all():
+        a, h, G = a[keep], h[keep], G[keep]
+    point = conic.run(_programme(a, h, G, chart.scale**2))
     multipliers = np.where(np.isfinite(point.dual), point.dual, 0.0)[: int(keep.sum())]
     weights = np.zeros(len(chart.a))
     weights[keep] = np.maximum(multipliers, 0.0) / chart.size[keep]

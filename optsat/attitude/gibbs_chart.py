@@ -7,6 +7,7 @@ convex in it.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,18 +22,17 @@ ROUNDOFF = 2.3e-16
 class GibbsChart:
     """Constraints about a pivot, each divided by its own size.
 
-    q_BN : (4,) pivot; scale : s = tan(theta / 2) of |g| = 1
+    admissible : the set; q_BN : (4,) pivot; scale : s = tan(theta / 2) of |g| = 1
     a (n,), h (n, 3), G (n, 3, 3) : scaled coefficients; size (n,) : what they were divided by
-    rounding (n,) : bound of the rounding error of f anywhere on |g| <= 2, in scaled units
     """
 
+    admissible: AdmissibleSet
     q_BN: Array
     scale: float
     a: Array
     h: Array
     G: Array
     size: Array
-    rounding: Array
 
     @staticmethod
     def about(admissible: AdmissibleSet, q_BN: Array, scale: float) -> "GibbsChart":
@@ -44,18 +44,21 @@ class GibbsChart:
         admissible: AdmissibleSet, q_BN: Array, scale: float, quadratics: tuple[Array, Array, Array]
     ) -> "GibbsChart":
         """Return the chart about q_BN from the constraints a + 2 h.g + g^T G g that `admissible.centred` gave there."""
-        a, h, G = quadratics
-        h, G = scale * h, scale**2 * G
+        a, h, G = quadratics[0], scale * quadratics[1], scale**2 * quadratics[2]
         size = np.maximum(np.maximum(np.abs(a), np.abs(h).max(axis=1)), np.abs(G).max(axis=(1, 2)))
         size = np.maximum(size, np.finfo(float).tiny)
-        m = admissible.cone_count
-        # a cone's a is a difference of squares of size eps^2, its h carries the rounding of y, a cut's a has its
-        # full size
-        cones = np.sqrt(2 * admissible.cone_versine) + np.linalg.norm(h[:m], axis=1) + scale + ROUNDOFF
-        noise = 40 * ROUNDOFF * np.concatenate((cones, admissible.magnitude[m:])) / size
-        return GibbsChart(
-            q_BN, scale, a / size, h / size[:, None], G / size[:, None, None], size, noise + 40 * ROUNDOFF
-        )
+        return GibbsChart(admissible, q_BN, scale, a / size, h / size[:, None], G / size[:, None, None], size)
+
+    @cached_property
+    def rounding(self) -> Array:
+        """Bound (n,) of the rounding error of every scaled constraint anywhere on |g| <= 2."""
+        known, m = self.admissible, self.admissible.cone_count
+        linear = np.linalg.norm(self.h[:m], axis=1) * self.size[:m]
+        # a of a cone is a difference of squares of size eps^2, its h carries the rounding of y; a of a cut has its full
+        # size
+        cones = np.sqrt(2 * known.cone_versine) + linear + self.scale + ROUNDOFF
+        terms = np.concatenate((cones, known.magnitude[m:]))
+        return np.asarray(40 * ROUNDOFF * (terms / self.size + 1))
 
     def attitude(self, g: Array) -> Array:
         """Return the unit quaternions (..., 4) of chart points g (..., 3)."""

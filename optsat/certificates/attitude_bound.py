@@ -112,20 +112,24 @@ def ball_of(total: WeightedSum) -> Ball:
 def recentre(total: WeightedSum) -> Array:
     """Return the attitude at which the weighted sum is largest, one Newton step from its present centre."""
     bounded = np.linalg.eigvalsh(total.C)[..., 0] > total.rounding
+    if bounded.ndim == 0:
+        return turn(total.q_BN, np.asarray(np.linalg.solve(total.C, total.h), np.float64)) if bounded else total.q_BN
     safe = np.where(bounded[..., None, None], total.C, np.eye(3))
     step = np.linalg.solve(safe, total.h[..., None])[..., 0]
     return turn(total.q_BN, np.where(bounded[..., None], step, 0.0))
 
 
-def best_centre(admissible: AdmissibleSet, weights: Array, recentrings: int = 1) -> Array:
-    """Return the attitude (4,) about which the given weights (count,), sum 1, prove the smallest ball.
+def centred_sum(admissible: AdmissibleSet, weights: Array) -> WeightedSum:
+    """Return the weighted sum about the attitude where the weights (count,), sum 1, prove the smallest ball.
 
-    The Davenport attitude of the weights, finished by Newton steps on the vectors.
+    The Davenport attitude of the weights, finished by a Newton step on the vectors where its rounding shows.
     """
     q_BN = dominant_quaternion(davenport_matrix(admissible.left_B, admissible.right_N, weights))
-    for _ in range(recentrings):
-        q_BN = recentre(sum_about(admissible, weights, q_BN))
-    return q_BN
+    total = sum_about(admissible, weights, q_BN)
+    negligible = 1e-10 * np.sqrt(max(float(total.a), 0.0) * max(float(np.trace(total.C)), 0.0))
+    if float(np.linalg.norm(total.h)) > negligible:
+        total = sum_about(admissible, weights, recentre(total))
+    return total
 
 
 def enclose(admissible: AdmissibleSet, weights: Array) -> Ball:
@@ -133,8 +137,7 @@ def enclose(admissible: AdmissibleSet, weights: Array) -> Ball:
 
     Source: robust Wahba specification, Theorem 1 with its rounding-safe evaluation.
     """
-    weights = weights / weights.sum()
-    return ball_of(sum_about(admissible, weights, best_centre(admissible, weights)))
+    return ball_of(centred_sum(admissible, weights / weights.sum()))
 
 
 def sum_about(admissible: AdmissibleSet, weights: Array, q_BN: Array) -> WeightedSum:

@@ -214,6 +214,9 @@ def test_cuts_shrink_the_set_and_can_empty_it() -> None:
     assert quaternion.error_angle(cut.q_BN, Q) <= cut.bound_rad
     assert cut.bound_rad == pytest.approx(optsat.certify_attitude(body(AXES), AXES, 0.02).bound_rad, rel=1e-5)
     assert cut.certificate.verify()
+    # at the truth a cone has its whole versine to spare, and a cut 1 - c
+    slack = cut.certificate.admissible.values(np.stack((Q, -Q)))
+    np.testing.assert_allclose(slack, [np.repeat((1 - np.cos(0.1), 1 - np.cos(0.02)), 3)] * 2, atol=1e-15)
     empty = optsat.certify_attitude(body(AXES), AXES, 0.1, cuts=(body(AXES), AXES, (1.5, 0, 0)))
     assert empty.status is AttitudeStatus.INCONSISTENT
     assert empty.certificate.verify()

@@ -192,12 +192,12 @@ RULES: dict[str, tuple[Rule, Tree]] = {
         never({"records"}, {"problems", "solvers"}),
         {"optsat.records.csv_log": "class A:\n    from optsat.problems.wahba import Wahba"},
     ),
-    "models import only attitude, symbolic, arrays, errors and units": (
-        only("models", {"attitude", "symbolic", "arrays", "errors", "units"}),
+    "models import only attitude, symbolic, port, arrays, errors and units": (
+        only("models", {"attitude", "symbolic", "port", "arrays", "errors", "units"}),
         {"optsat.models.sun": "from optsat.forms import Point"},
     ),
-    "simulation imports only models, symbolic, attitude, records, arrays, errors and units": (
-        only("simulation", {"models", "symbolic", "attitude", "records", "arrays", "errors", "units"}),
+    "simulation imports only models, symbolic, port, attitude, records, arrays, errors and units": (
+        only("simulation", {"models", "symbolic", "port", "attitude", "records", "arrays", "errors", "units"}),
         {"optsat.simulation.orbit_scenario": "from optsat.determine import certify_attitude"},
     ),
     "plots import only estimators, records, arrays and errors": (
@@ -206,7 +206,7 @@ RULES: dict[str, tuple[Rule, Tree]] = {
     ),
     "attitude imports only arrays and errors": (
         only("attitude", {"arrays", "errors"}),
-        {"optsat.attitude.dcm": "from optsat.symbolic.port import Port"},
+        {"optsat.attitude.dcm": "from optsat.port import Port"},
     ),
     "only the public face, the command line and studies know everything": (
         only_the_top_knows_the_top,

@@ -7,8 +7,8 @@ import numpy as np
 from optsat.arrays import Array
 from optsat.models import draws
 from optsat.models.parameters import check_scalar
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
-from optsat.symbolic.port import Port
 
 
 @dataclass(frozen=True)

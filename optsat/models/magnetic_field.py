@@ -7,8 +7,8 @@ from optsat.attitude.backend import Value, dot, norm
 from optsat.models.earth import EQUATORIAL_RADIUS, sidereal_angle
 from optsat.models.epoch import Epoch
 from optsat.models.parameters import check_scalar
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
-from optsat.symbolic.port import Port
 
 
 @dataclass(frozen=True)

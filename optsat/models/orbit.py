@@ -10,8 +10,8 @@ from optsat.attitude import frames
 from optsat.attitude.backend import Value, norm
 from optsat.models.earth import EQUATORIAL_RADIUS, GRAVITATIONAL_PARAMETER
 from optsat.models.parameters import check_scalar
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
-from optsat.symbolic.port import Port
 
 _NEWTON_STEPS = 8
 

@@ -11,9 +11,9 @@ from optsat.attitude.backend import Value, norm
 from optsat.errors import InputError
 from optsat.models.earth import GRAVITATIONAL_PARAMETER
 from optsat.models.parameters import check_scalar
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
 from optsat.symbolic.integrate import rk4_step
-from optsat.symbolic.port import Port
 
 _ROUNDING = 1e-9
 

@@ -17,8 +17,8 @@ from optsat.attitude.backend import Value, components, norm
 from optsat.errors import InputError
 from optsat.models import draws
 from optsat.models.parameters import check_scalar
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
-from optsat.symbolic.port import Port
 
 
 class VectorSensor(Protocol):

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from optsat.attitude.backend import Value, dot
 from optsat.models.earth import EQUATORIAL_RADIUS
 from optsat.models.epoch import DAYS_PER_CENTURY, SECONDS_PER_DAY, Epoch
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
-from optsat.symbolic.port import Port
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ import numpy as np
 from optsat.arrays import Array
 from optsat.models.orbit import CircularOrbit
 from optsat.models.rigid_body import RigidBody
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
 from optsat.symbolic.integrate import rk4_step
-from optsat.symbolic.port import Port
 
 LONGEST_STEP_S = 1.0
 """Orbital motion turns a body by a milliradian a second; one such step of order four errs by less than 1e-15 rad."""

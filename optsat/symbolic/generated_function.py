@@ -8,7 +8,7 @@ import numpy as np
 
 from optsat.attitude.backend import Value, is_symbolic
 from optsat.errors import InputError, UnknownOptionError, nearest_name
-from optsat.symbolic.port import Port
+from optsat.port import Port
 
 
 @dataclass(frozen=True, eq=False, repr=False)

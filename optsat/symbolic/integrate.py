@@ -5,8 +5,8 @@ from typing import TypeAlias
 
 from optsat.attitude.backend import Value
 from optsat.errors import InputError
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate, port_named
-from optsat.symbolic.port import Port
 
 Point: TypeAlias = dict[str, Value]
 

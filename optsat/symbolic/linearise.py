@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, flattened, generate, port_named, shaped
-from optsat.symbolic.port import Port
 
 
 def linearise(derivative: GeneratedFunction, states: Sequence[str], inputs: Sequence[str]) -> GeneratedFunction:

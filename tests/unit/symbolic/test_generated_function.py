@@ -8,8 +8,8 @@ import pytest
 
 from optsat.arrays import Array
 from optsat.errors import InputError, UnknownOptionError
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
-from optsat.symbolic.port import Port
 
 
 def example() -> GeneratedFunction:

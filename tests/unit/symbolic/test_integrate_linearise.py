@@ -6,10 +6,10 @@ import pytest
 from scipy.linalg import expm
 
 from optsat.errors import InputError
+from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
 from optsat.symbolic.integrate import rk4_step
 from optsat.symbolic.linearise import linearise
-from optsat.symbolic.port import Port
 
 X, U, T = Port("x", (2,), "-"), Port("u", (1,), "-"), Port("t", (), "s")
 

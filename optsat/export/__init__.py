@@ -1,0 +1,1 @@
+"""Export: kernels as freestanding C for flight computers."""

@@ -1,0 +1,1 @@
+"""C text that every kernel stands on."""

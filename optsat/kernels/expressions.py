@@ -1,0 +1,69 @@
+"""Expressions: the nodes of a program as assignments, spelt by the tables of a language."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from optsat.kernels.codes import TRUTH
+from optsat.kernels.program import Constant, Input, Operation, Program
+
+
+@dataclass(frozen=True)
+class Language:
+    """How one language writes the nodes.
+
+    operations : template by code, of the operands {a} and {b} as numbers, {p} and {q} as truth values
+    number : template that makes a number of the truth value {p}; truth : a truth value of the number {a}
+    constant, load : spelling of a constant, of an input
+    words : what else the templates name in braces
+    """
+
+    operations: Mapping[str, str]
+    number: str
+    truth: str
+    constant: Callable[[float], str]
+    load: Callable[[Input], str]
+    words: Mapping[str, str]
+
+    def write(self, template: str, **operands: str) -> str:
+        """Return the template with the operands and the words in place."""
+        return template.format(**operands, **self.words)
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """One variable, whether it holds a truth value, and its expression."""
+
+    variable: str
+    is_truth: bool
+    expression: str
+
+
+def assignments(program: Program, language: Language) -> Iterator[Assignment]:
+    """Yield a variable for each input and operation, in order; constants stand where they are used."""
+    for index, node in enumerate(program.nodes):
+        if isinstance(node, Input):
+            yield Assignment(f"t{index}", False, language.load(node))
+        elif isinstance(node, Operation):
+            numbers = [as_number(program, i, language) for i in node.operands]
+            truths = [_as_truth(program, i, language) for i in node.operands]
+            named = dict(zip("ab", numbers, strict=False)) | dict(zip("pq", truths, strict=False))
+            yield Assignment(f"t{index}", node.code in TRUTH, language.write(language.operations[node.code], **named))
+
+
+def as_number(program: Program, index: int, language: Language) -> str:
+    """Return how the value of a node is written as a number."""
+    node = program.nodes[index]
+    if isinstance(node, Constant):
+        return language.constant(node.value)
+    return language.write(language.number, p=f"t{index}") if _is_truth(program, index) else f"t{index}"
+
+
+def _as_truth(program: Program, index: int, language: Language) -> str:
+    if _is_truth(program, index):
+        return f"t{index}"
+    return language.write(language.truth, a=as_number(program, index, language))
+
+
+def _is_truth(program: Program, index: int) -> bool:
+    node = program.nodes[index]
+    return isinstance(node, Operation) and node.code in TRUTH

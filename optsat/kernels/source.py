@@ -1,0 +1,37 @@
+"""Kernel source: the C text of one kernel, whatever it is made of, and the ports that it is called through."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from optsat.arrays import Array
+from optsat.port import Port
+
+Twin = Callable[[Array], tuple[int, Array]]
+"""The same computation in plain Python: x (k_in,) to status and y (k_out,)."""
+
+
+@dataclass(frozen=True)
+class KernelSource:
+    """C text of a kernel over `os_rt.h`, in strict C99.
+
+    Arguments stand dense, matrices counted by rows, one after another in x; results in y likewise.
+
+    body : text that defines either
+        `static inline void NAME_leaf(const os_real_t *x, os_real_t *y)`, or where `has_status`
+        `static os_status_t NAME_body(const os_real_t *x, os_real_t *y, NAME_work_t *work)` and its struct NAME_work_t;
+        all of x is read before any of y is written
+    lanes : text of the same leaf over vectors of several samples, or "" where there is none
+    libm : the C functions used whose last bits depend on the machine
+    operations : arithmetic operations of one sample, or of one iteration where they are not fixed
+    twin : the same in plain Python, where no C compiler is; None for a leaf, which CasADi runs
+    """
+
+    name: str
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    body: str
+    has_status: bool = False
+    lanes: str = ""
+    libm: tuple[str, ...] = ()
+    operations: int = 0
+    twin: Twin | None = None

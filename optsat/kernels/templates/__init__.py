@@ -1,0 +1,1 @@
+"""Templates: loops written by hand in C, with the printed leaves in their slots."""

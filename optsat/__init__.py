@@ -14,7 +14,7 @@ from optsat.solve import solve
 if TYPE_CHECKING:
     from optsat.attitude.status import AttitudeStatus
     from optsat.determine import CertifiedBatch, certify_attitude, certify_attitude_batch, wahba
-    from optsat.errors import InputError, NotProvenError, OptsatError, RecordError
+    from optsat.errors import InputError, NotProvenError, OptsatError, RecordError, UnknownOptionError
     from optsat.estimators.attitude_series import AttitudeSeries, Window, certify_record
     from optsat.estimators.isolation import Isolation, isolate
     from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
@@ -41,6 +41,7 @@ _HOME = {
     "RecordError": "optsat.errors",
     "Solution": "optsat.solution",
     "Termination": "optsat.solution",
+    "UnknownOptionError": "optsat.errors",
     "VectorChannel": "optsat.records.record",
     "Wahba": "optsat.problems.wahba",
     "WahbaAttitude": "optsat.problems.wahba",
@@ -71,6 +72,7 @@ __all__ = [
     "RecordError",
     "Solution",
     "Termination",
+    "UnknownOptionError",
     "VectorChannel",
     "Wahba",
     "WahbaAttitude",

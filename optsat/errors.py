@@ -8,6 +8,7 @@ from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 
 
 class OptsatError(Exception):
@@ -63,13 +64,22 @@ def nearest_name(name: str, known: list[str]) -> str:
 
 def explain_unknown_options(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a public function so that a misspelt keyword names the nearest option instead of a bare TypeError."""
-    known = list(inspect.signature(function).parameters)
+    return _checked(function, function.__name__, list(inspect.signature(function).parameters))
 
+
+def explain_unknown_fields(data: type[T]) -> type[T]:
+    """Decorate a public dataclass likewise."""
+    known = list(inspect.signature(data).parameters)
+    setattr(data, "__init__", _checked(data.__init__, data.__name__, known))  # noqa: B010
+    return data
+
+
+def _checked(function: Callable[P, R], called: str, known: list[str]) -> Callable[P, R]:
     @functools.wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
         for name in kwargs:
             if name not in known:
-                raise UnknownOptionError(f"{function.__name__} has no option `{name}`.{nearest_name(name, known)}")
+                raise UnknownOptionError(f"{called} has no option `{name}`.{nearest_name(name, known)}")
         return function(*args, **kwargs)
 
     return checked

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from optsat.errors import UnsupportedFormError
+from optsat.errors import UnsupportedFormError, explain_unknown_options
 
 if TYPE_CHECKING:
     # the verb is a public name, so importing optsat imports this module: it must not bring NumPy along
@@ -41,6 +41,7 @@ class Solver(Protocol):
         ...
 
 
+@explain_unknown_options
 def solve(problem: Problem[A], solver: Solver | None = None, start: "Point | None" = None) -> "Solution[A]":
     """Return the solution of `problem` by `solver`, or by the first solver of the ordered table that accepts its form.
 

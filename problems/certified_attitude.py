@@ -15,7 +15,7 @@ from optsat.attitude.davenport import canonical, rotation_matrix
 from optsat.attitude.status import AttitudeStatus
 from optsat.certificates.attitude_bound import Ball, ball_of, centred_sum, ellipsoid, sum_about
 from optsat.certificates.attitude_certificate import AttitudeCertificate
-from optsat.errors import InputError
+from optsat.errors import InputError, explain_unknown_fields
 from optsat.forms import EnclosureForm, Point
 from optsat.problems.component_box import ComponentBox, box_constraints
 from optsat.solution import Proof, Solution, Termination
@@ -109,6 +109,7 @@ class CertifiedAttitude:
         return self.certificate.claim
 
 
+@explain_unknown_fields
 @dataclass(frozen=True)
 class CertifiedAttitudeProblem:
     """Find the smallest ball of attitudes that surely holds the truth.

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optsat.arrays import Array, Mask, angle_bounds, finite_array, normalise_rows
-from optsat.errors import InfeasibleBoxError, InputError
+from optsat.errors import InfeasibleBoxError, InputError, explain_unknown_fields
 
 _SLACK = 1e-12
 # outward margin of cones and cuts: the support function is accurate to a few roundings
 _OUTWARD = 1e-13
 
 
+@explain_unknown_fields
 @dataclass(frozen=True)
 class ComponentBox:
     """Unit vectors x with low <= x <= high component by component; rows are directions.

@@ -10,6 +10,7 @@ from optsat.attitude.alignment import curvature, loss, smallest_rotation
 from optsat.attitude.covariance import attitude_covariance
 from optsat.attitude.davenport import canonical, rotation_matrix
 from optsat.attitude.status import AttitudeStatus
+from optsat.errors import explain_unknown_fields
 from optsat.forms import AlignmentForm, Point
 from optsat.solution import Proof, Solution
 
@@ -46,6 +47,7 @@ class WahbaAttitude:
         return attitude_covariance(self.b_B, self.weights, sigma_rad)
 
 
+@explain_unknown_fields
 @dataclass(frozen=True)
 class Wahba:
     """Minimise 1/2 sum a_i |b_i - A(q) r_i|^2, a = weights / sum of weights, directions scaled to length 1.

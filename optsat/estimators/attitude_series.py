@@ -11,13 +11,14 @@ from optsat.arrays import Array
 from optsat.attitude import quaternion
 from optsat.attitude.status import AttitudeStatus
 from optsat.determine import certify_attitude, certify_attitude_batch
-from optsat.errors import InputError
+from optsat.errors import InputError, explain_unknown_fields, explain_unknown_options
 from optsat.estimators.relative_attitude import RelativeAttitude
 from optsat.records.record import Record
 
 Progress = Callable[[int, int], None]
 
 
+@explain_unknown_fields
 @dataclass(frozen=True)
 class Window:
     """How past measurements are used: length_s back in time [s], one epoch every spacing_s [s].
@@ -79,6 +80,7 @@ class AttitudeSeries:
         return error
 
 
+@explain_unknown_options
 def certify_record(
     record: Record, window: Window | None = None, progress: Progress | None = None, *, every: int = 1
 ) -> AttitudeSeries:
@@ -95,6 +97,14 @@ def certify_record(
     InputError : a window without gyro or without its bound; `every` below 1.
     Source: robust Wahba specification, section 7.3.
     """
+    if not isinstance(record, Record):
+        raise InputError(
+            f"`record` must be a Record, got {type(record).__name__}; optsat.read_csv_log(path) reads one."
+        )
+    if window is not None and not isinstance(window, Window):
+        raise InputError(
+            f"`window` must be an optsat.Window(length_s, spacing_s) or None, got {type(window).__name__}."
+        )
     relative = None if window is None else RelativeAttitude.of(record)
     if isinstance(every, bool) or not isinstance(every, int) or every < 1:
         raise InputError(f"`every` must be a whole number >= 1, got {every!r}.")
@@ -170,8 +180,11 @@ def _epoch(
         and len(present)
     ):
         best, left_out = _fewest_left_out(record, k, present, past)
-        if best is None or best[2] == _INCONSISTENT:
-            # the past itself is contradictory or gone: start again from the present frame
+        alone = _certified(record, k, present, None)
+        agreeing = len(left_out) == len(present) > 1 and alone is not None and alone[2] != _INCONSISTENT
+        if best is None or best[2] == _INCONSISTENT or agreeing:
+            # the past is contradictory or gone, or stands alone against sensors that agree (a gyro that breaks its
+            # bound spoils it): start again from the present frame
             history.forget()
             past, left_out = None, []
             best = _certified(record, k, present, None)

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from optsat.arrays import Array, normalise_rows
-from optsat.errors import InputError, RecordError
+from optsat.errors import InputError, RecordError, explain_unknown_fields, explain_unknown_options
 from optsat.records.record import Record, VectorChannel
 
 _REST_S = 20.0
@@ -34,6 +34,7 @@ _UP_N = np.array([0.0, 0.0, 1.0])
 _KEYS = {"imu_gyr": 3, "imu_acc": 3, "imu_mag": 3, "opt_quat": 4}
 
 
+@explain_unknown_fields
 @dataclass(frozen=True)
 class BroadBounds:
     """How far the two directions may be off, from the IMU alone; the defaults are for undisturbed rotation trials.
@@ -78,6 +79,7 @@ class BroadBounds:
             raise InputError("`window_s` must be positive and `largest_rad` below pi.")
 
 
+@explain_unknown_options
 def load_broad(path: str | os.PathLike[str], bounds: BroadBounds | None = None, stride: int = 1) -> Record:
     """Read a trial as a record with the channels `gravity` and `field`, the gyro, and the optical attitude.
 

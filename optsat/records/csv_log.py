@@ -40,7 +40,7 @@ The body
 
 import os
 
-from optsat.errors import RecordError
+from optsat.errors import RecordError, explain_unknown_options
 from optsat.records.csv_body import read_body
 from optsat.records.csv_layout import parse_layout
 from optsat.records.csv_table import read_table
@@ -50,6 +50,7 @@ from optsat.records.record import Record
 __all__ = ["read_csv_log", "write_csv_log"]
 
 
+@explain_unknown_options
 def read_csv_log(path: str | os.PathLike[str], strict: bool = False) -> Record:
     """Read a log: directions as unit vectors in B and N, everything in SI, bad rows listed in `record.bad_rows`.
 

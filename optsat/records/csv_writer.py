@@ -11,11 +11,13 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from optsat.arrays import Array, finite_array
+from optsat.errors import explain_unknown_options
 from optsat.files import write_atomically
 from optsat.records.csv_layout import MAGIC
 from optsat.records.record import Record, VectorChannel
 
 
+@explain_unknown_options
 def write_csv_log(path: str | os.PathLike[str], record: Record, frames: Mapping[str, ArrayLike] | None = None) -> None:
     """Write `record` in SI with 17 digits, so that reading gives the same numbers bit for bit.
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optsat.arrays import Array
-from optsat.errors import InputError
+from optsat.errors import InputError, explain_unknown_fields
 
 Mask = NDArray[np.bool_]
 
@@ -26,6 +26,7 @@ class BadRow:
     reason: str
 
 
+@explain_unknown_fields
 @dataclass(frozen=True, eq=False, repr=False)
 class VectorChannel:
     """One direction sensor over time.
@@ -77,6 +78,7 @@ class VectorChannel:
         return f"VectorChannel({self.name!r}, frame={self.frame!r}, {int(self.valid.sum())} of {len(self.valid)} valid)"
 
 
+@explain_unknown_fields
 @dataclass(frozen=True, eq=False, repr=False)
 class Record:
     """A log of direction pairs, rates and, where known, the true attitude.

@@ -1,5 +1,6 @@
 """Inputs of the robust Wahba specification, section 11, and a newcomer's mistakes: who is named, where, what cures."""
 
+import inspect
 import re
 from collections.abc import Callable
 from typing import Any
@@ -164,6 +165,22 @@ def test_choices_offer_the_nearest() -> None:
 def test_misspelt_options_offer_the_nearest(call: Call, args: tuple[Any, ...], typo: str, meant: str) -> None:
     with pytest.raises(UnknownOptionError, match=f"no option `{typo}`. Did you mean `{meant}`?"):
         call(*args, **{typo: 1})
+
+
+# what optsat returns and raises, and nobody calls
+NOT_CALLED = {"AttitudeSeries", "AttitudeStatus", "CertifiedAttitude", "CertifiedBatch", "Isolation", "Proof"} | {
+    *("Solution", "Termination", "WahbaAttitude"),
+    *(name for name in optsat.__all__ if name.endswith("Error") or name.startswith("__")),
+}
+
+
+@pytest.mark.parametrize("name", sorted(set(optsat.__all__) - NOT_CALLED))
+def test_every_public_call_offers_the_nearest_option(name: str) -> None:
+    call = getattr(optsat, name)
+    meant = list(inspect.signature(call).parameters)[-1]
+    typo = f"{meant}s"
+    with pytest.raises(UnknownOptionError, match=f"{name} has no option `{typo}`. Did you mean `{meant}`?"):
+        call(**{typo: 1})
 
 
 def test_cuts_that_cannot_be_used() -> None:

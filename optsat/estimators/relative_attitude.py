@@ -52,7 +52,7 @@ class RelativeAttitude:
         step = quaternion.exponential(0.5 * (rate[:-1] + rate[1:]) * dt[:, None])
         slope = np.linalg.norm(np.diff(rate, axis=0), axis=1) / dt
         size = np.linalg.norm(rate, axis=1)
-        curve = _second_derivative(rate, t)
+        curve = _second_derivative(rate, t, joined)
         integration = dt**3 / 12 * (np.maximum(curve[:-1], curve[1:]) + np.maximum(size[:-1], size[1:]) * slope)
         growth = dt * np.maximum(error[:-1], error[1:]) + 2 * integration
         total = prefix_products(np.concatenate((np.array([[0.0, 0.0, 0.0, 1.0]]), step)))
@@ -70,13 +70,24 @@ class RelativeAttitude:
         return turn, float(abs(self.growth_rad[k] - self.growth_rad[j]))
 
 
-def _second_derivative(rate: Array, t: Array) -> Array:
-    """Return |omega''| (T,) by divided differences; the ends repeat their neighbours."""
+def _second_derivative(rate: Array, t: Array, joined: NDArray[np.bool_]) -> Array:
+    """Return |omega''| (T,) by divided differences over unbroken samples; the ends of each run repeat their neighbours.
+
+    joined (T - 1,) : steps whose two samples are both known
+    """
     curve = np.zeros(len(t))
-    if len(t) >= 3:
-        slope = np.diff(rate, axis=0) / np.diff(t)[:, None]
-        curve[1:-1] = np.linalg.norm(np.diff(slope, axis=0), axis=1) / (0.5 * (t[2:] - t[:-2]))
-        curve[0], curve[-1] = curve[1], curve[-2]
+    if len(t) < 3:
+        return curve
+    slope = np.diff(rate, axis=0) / np.diff(t)[:, None]
+    inside = np.flatnonzero(joined[:-1] & joined[1:]) + 1
+    curve[inside] = np.linalg.norm(slope[inside] - slope[inside - 1], axis=1) / (0.5 * (t[inside + 1] - t[inside - 1]))
+    interior = np.zeros(len(t), dtype=bool)
+    interior[inside] = True
+    first = np.flatnonzero(~interior[:-1] & joined & interior[1:])
+    last = np.flatnonzero(interior[:-1] & joined & ~interior[1:]) + 1
+    curve[first], curve[last] = curve[first + 1], curve[last - 1]
+    # a run of two samples shows no curvature: it is taken to be as large as anywhere in the record
+    curve[~interior & ~np.isin(np.arange(len(t)), np.concatenate((first, last)))] = curve.max()
     return curve
 
 

@@ -71,6 +71,26 @@ def test_a_gap_ends_the_segment() -> None:
     assert not relative.connected(3, 4)
     assert not relative.connected(3, 5)
     assert not relative.connected(4, 5)
+    # steps beside the gap are bounded as they would be at the ends of a record
+    whole = RelativeAttitude.of(record)
+    growth, unbroken = np.diff(relative.growth_rad), np.diff(whole.growth_rad)
+    known = [0, 1, 2, 5, 6, 7, 8]
+    assert np.all(growth[known] <= 1.1 * unbroken[known])
+
+
+def test_integration_error_beside_gaps_is_within_its_allowance() -> None:
+    record = flight(count=24, dt=2.0, gyro_bound=0.0)
+    assert record.omega_BN_B is not None
+    assert record.q_BN_true is not None
+    omega = np.array(record.omega_BN_B)
+    omega[[5, 8, 12]] = np.nan
+    relative = RelativeAttitude.of(flight(count=24, dt=2.0, gyro_bound=0.0, omega_BN_B=omega))
+    pairs = [(j, k) for j in range(24) for k in range(j + 1, 24) if relative.connected(j, k)]
+    assert len(pairs) == 10 + 1 + 3 + 55
+    for j, k in pairs:
+        turn, growth = relative.rotation(j, k)
+        truth = dcm.from_quaternion(record.q_BN_true[k]) @ dcm.from_quaternion(record.q_BN_true[j]).T
+        assert quaternion.error_angle(dcm.to_quaternion(turn), dcm.to_quaternion(truth)) <= growth + 1e-13
 
 
 def test_short_records() -> None:

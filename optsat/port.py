@@ -9,6 +9,7 @@ import numpy as np
 
 from optsat.arrays import Array, finite_array
 from optsat.errors import InputError
+from optsat.port_checks import fault_of_checks, safe_values
 
 _NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
 
@@ -20,21 +21,41 @@ class Port:
     name : letters, digits and single underscores; shape : (), (n,) or (n, m); unit : SI, "-" for none
     frame : letter of the frame of the components, where the name does not carry it
 
+    The rest is what flight code checks beyond finite numbers, of arguments and of results:
+    unit_norm : by how much the length of the vector, or of each row of a matrix, may differ from 1
+    lower, upper : range of every entry, ends included
+    positive_definite : a covariance: symmetric, diagonal positive, no entry larger than its diagonal allows
+    direction : rows of any length but zero, which flight code scales to length 1; it counts those whose length differed
+        from 1 by more than this number
+    counted : how many of the rows hold data is told at run time; the others repeat row 0, or hold `padding`
+    safe : what a result holds when a check failed, one number or one for each entry; unless given the identity
+        quaternion or first axis where `unit_norm`, the identity matrix where `positive_definite`, else 0 within range
+
     Raises
     ------
-    InputError : the name is not one, or the shape has more than two axes.
+    InputError : the name is not one, the shape has more than two axes, or the checks do not fit shape or safe value.
     """
 
     name: str
     shape: tuple[int, ...]
     unit: str
     frame: str = ""
+    unit_norm: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    positive_definite: bool = False
+    direction: float | None = None
+    counted: bool = False
+    padding: float | None = None
+    safe: float | tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
             raise InputError(f"`{self.name}` is no name of a port: use letters, digits and single underscores.")
         if len(self.shape) > 2 or any(n < 1 for n in self.shape):
             raise InputError(f"Port `{self.name}` must have shape (), (n,) or (n, m), got {self.shape}.")
+        if fault := fault_of_checks(self):
+            raise InputError(f"Port `{self.name}` {self.shape}: {fault}.")
 
     @property
     def size(self) -> int:
@@ -50,6 +71,16 @@ class Port:
     def columns(self) -> int:
         """Columns of the CasADi matrix."""
         return self.shape[1] if len(self.shape) == 2 else 1
+
+    @property
+    def row_length(self) -> int:
+        """Scalars of one vector: of the port itself, or of a row of its matrix."""
+        return self.shape[-1] if self.shape else 1
+
+    @property
+    def safe_values(self) -> tuple[float, ...]:
+        """What a result holds when a check failed, matrices counted by rows."""
+        return safe_values(self)
 
     def __str__(self) -> str:
         frame = f" in {self.frame}" if self.frame else ""

@@ -4,7 +4,6 @@ Every figure is a ratio of two things run in turn within one process, so that a 
 """
 
 import importlib
-import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -14,6 +13,7 @@ from optsat.arrays import Array
 from optsat.attitude.admissible_set import AdmissibleSet
 from optsat.attitude.davenport import pair_matrices, rotation_matrix
 from optsat.campaign.claim import Claim, judge_bar
+from optsat.campaign.interleaved import time_interleaved
 from optsat.campaign.study import Case, Row, Study
 from optsat.determine import certify_attitude, certify_attitude_batch
 from optsat.models.draws import directions, rotations, tilted
@@ -35,33 +35,26 @@ def run(case: Case, rng: np.random.Generator) -> Row:
     b2, r2, eps2 = _poses(rng, BATCH, 2)
     b, r, eps = (part[0] for part in _poses(rng, 1, m))
     programme = _cvxpy_programme(m)
-    alternatives: dict[str, tuple[Callable[[], object], int]] = {
-        "align_vectors": (lambda: Rotation.align_vectors(b2[0], r2[0]), 40),
-        "batch": (lambda: certify_attitude_batch(b2, r2, eps2), 1),
-        "certify": (lambda: certify_attitude(b, r, eps, norm_policy="silent"), 8),
-        "certify_two": (lambda: certify_attitude(b2[0], r2[0], eps2[0], norm_policy="silent"), 8),
-        "cvxpy": (lambda: _cvxpy_as_written(b, r, eps), 1),
-        "cvxpy_unscaled": (lambda: _cvxpy_unscaled(b, r, eps), 1),
-        "cvxpy_unscaled_parametrised": (lambda: programme(b, r, eps), 2),
-    }
-    for function, _ in alternatives.values():
-        function()
-    taken: dict[str, list[float]] = {name: [] for name in alternatives}
-    for _ in range(5):
-        for name, (function, repeats) in alternatives.items():
-            start = time.perf_counter()
-            for _ in range(repeats):
-                function()
-            taken[name].append((time.perf_counter() - start) / repeats)
-    second = {name: float(np.median(values)) for name, values in taken.items()}
+    times = time_interleaved(
+        {
+            "align_vectors": lambda: Rotation.align_vectors(b2[0], r2[0]),
+            "batch": lambda: certify_attitude_batch(b2, r2, eps2),
+            "certify": lambda: certify_attitude(b, r, eps, norm_policy="silent"),
+            "certify_two": lambda: certify_attitude(b2[0], r2[0], eps2[0], norm_policy="silent"),
+            "cvxpy": lambda: _cvxpy_as_written(b, r, eps),
+            "cvxpy_unscaled": lambda: _cvxpy_unscaled(b, r, eps),
+            "cvxpy_unscaled_parametrised": lambda: programme(b, r, eps),
+        },
+        rounds=5,
+    )
     return {
         "vectors": m,
-        "batch_pose_over_align_vectors": second["batch"] / BATCH / second["align_vectors"],
-        "certify_two_over_align_vectors": second["certify_two"] / second["align_vectors"],
-        "certify_over_align_vectors": second["certify"] / second["align_vectors"],
-        "cvxpy_over_certify": second["cvxpy"] / second["certify"],
-        "cvxpy_unscaled_over_certify": second["cvxpy_unscaled"] / second["certify"],
-        "cvxpy_unscaled_parametrised_over_certify": second["cvxpy_unscaled_parametrised"] / second["certify"],
+        "batch_pose_over_align_vectors": times.ratio("batch", "align_vectors") / BATCH,
+        "certify_two_over_align_vectors": times.ratio("certify_two", "align_vectors"),
+        "certify_over_align_vectors": times.ratio("certify", "align_vectors"),
+        "cvxpy_over_certify": times.ratio("cvxpy", "certify"),
+        "cvxpy_unscaled_over_certify": times.ratio("cvxpy_unscaled", "certify"),
+        "cvxpy_unscaled_parametrised_over_certify": times.ratio("cvxpy_unscaled_parametrised", "certify"),
     }
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from optsat.commands import attitude, demo, doctor, simulate, study, verify
+from optsat.commands import attitude, bench, demo, doctor, simulate, study, verify
 from optsat.commands.output import note
 from optsat.errors import OptsatError
 
@@ -58,6 +58,7 @@ app.command("simulate", epilog="Example: optsat simulate scenario.toml --out log
     simulate.simulate_command
 )
 app.add_typer(study.app, name="study", epilog="Example: optsat study list")
+app.command("bench", epilog="Example: optsat bench kernels --json")(bench.bench_command)
 app.command("doctor", epilog="Example: optsat doctor --json")(doctor.doctor_command)
 
 

@@ -62,12 +62,13 @@ def run_command(
     if as_json:
         print_json(result.summary())
     else:
-        typer.echo(f"{study.title}\n{_in_words(result)}")
+        typer.echo(f"{study.title}\n{in_words(result)}")
     if not result.passed:
         raise typer.Exit(1)
 
 
-def _in_words(result: "StudyResult") -> str:
+def in_words(result: "StudyResult") -> str:
+    """Return metrics, judged claims and failures of a result for people."""
     parts = [f"{result.study}, version {result.version}: {result.cases} cases, seed {result.seed}"]
     if result.metrics:
         parts.append(aligned([(f"  {name}", f"{value:.6g}") for name, value in result.metrics.items()]))

@@ -1,6 +1,7 @@
 """Interleaved timing: every alternative in every round, in turn, and ratios over the rounds."""
 
 import itertools
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -32,7 +33,7 @@ def test_alternatives_run_in_turn_and_for_long_enough(monkeypatch: pytest.Monkey
         now += seconds
         log.append(name)
 
-    monkeypatch.setattr(interleaved.time, "perf_counter", clock)
+    monkeypatch.setattr(time, "perf_counter", clock)
     times = time_interleaved(
         {"slow": lambda: taking("slow", 1.0), "fast": lambda: taking("fast", 0.25)}, 3, least_s=2.0
     )
@@ -46,7 +47,7 @@ def test_alternatives_run_in_turn_and_for_long_enough(monkeypatch: pytest.Monkey
 def test_a_call_too_short_for_the_clock_ends_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(interleaved, "_MOST_CALLS", 8)
     ticks: Iterator[int] = itertools.count()
-    monkeypatch.setattr(interleaved.time, "perf_counter", lambda: 1e-3 * next(ticks))
+    monkeypatch.setattr(time, "perf_counter", lambda: 1e-3 * next(ticks))
     assert time_interleaved({"nothing": lambda: None}, rounds=2).second["nothing"].shape == (2,)
 
 

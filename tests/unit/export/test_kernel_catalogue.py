@@ -1,0 +1,53 @@
+"""The catalogue of kernels: every entry is built, named, documented, and refuses what it does not know."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from optsat.errors import InputError, UnknownOptionError
+from optsat.export.catalogue import CATALOGUE, build, describe
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_a_kernel_carries_its_public_name(name: str) -> None:
+    assert build(name).name == name
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_parameter_is_explained(name: str) -> None:
+    entry = CATALOGUE[name]
+    assert entry.says
+    assert not entry.says.endswith(".")
+    for parameter in entry.parameters():
+        assert parameter.says, f"{entry.definition} says nothing of `{parameter.name}`"
+
+
+def test_a_description_holds_ports_and_operations() -> None:
+    text = str(describe("rigid_body_step"))
+    assert text.startswith("rigid_body_step: attitude and angular velocity")
+    assert "omega_BN_B (3,) [rad/s]" in text
+    assert "operations" in text
+
+
+def test_parameters_reach_the_definition() -> None:
+    one, two = (describe("rigid_body_step", substeps=substeps).operations for substeps in (1, 2))
+    assert one < two < 2 * one
+
+
+def test_unknown_names_offer_the_nearest() -> None:
+    with pytest.raises(InputError, match="Did you mean `rigid_body_step`"):
+        build("rigid_bodystep")
+    with pytest.raises(UnknownOptionError, match="no parameter `inertia`. Did you mean `inertia_B`"):
+        build("rigid_body_step", inertia=1)
+    with pytest.raises(InputError, match="'double' or 'float', got 'single'"):
+        build("sun", "single")  # type: ignore[arg-type]
+
+
+def test_listing_builds_nothing(root: Path) -> None:
+    program = (
+        "import sys\nfrom optsat.export.catalogue import CATALOGUE\n"
+        "for entry in CATALOGUE.values(): entry.parameters()\nassert 'casadi' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], cwd=root, check=True)

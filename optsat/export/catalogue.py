@@ -78,6 +78,22 @@ class Description:
 
 
 CATALOGUE: Mapping[str, Entry] = {
+    **{
+        name: Entry(f"optsat.symbolic.attitude_functions:{name}", says)
+        for name, says in {
+            "dcm_from_quaternion": "direction cosine matrix of a quaternion",
+            "quaternion_from_dcm": "quaternion of a direction cosine matrix, half turns included",
+            "mrp_from_quaternion": "modified Rodrigues parameters of a quaternion, in the unit ball",
+            "quaternion_from_mrp": "quaternion of modified Rodrigues parameters, shadow set or not",
+            "mrp_switch": "modified Rodrigues parameters taken to the shadow set where they leave the unit ball",
+            "rotation_vector_from_quaternion": "axis times angle of a quaternion, the angle at most pi",
+            "quaternion_from_rotation_vector": "quaternion of axis times angle",
+            "euler321_from_quaternion": "yaw, pitch and roll of a quaternion",
+            "quaternion_from_euler321": "quaternion of yaw, pitch and roll",
+            "quaternion_compose": "attitude of C relative to N from those of C to B and B to N",
+            "quaternion_error_angle": "angle between two attitudes, accurate where it is small",
+        }.items()
+    },
     "rigid_body_step": Entry(
         "optsat.export.model_kernels:rigid_body_step", "attitude and angular velocity of a rigid body after dt, by RK4"
     ),
@@ -94,7 +110,7 @@ CATALOGUE: Mapping[str, Entry] = {
 def build(name: str, precision: Precision = "double", **parameters: Any) -> Kernel:
     """Return the kernel of that name.
 
-    precision : of the arithmetic it will run in; kernels that need it take the smallest divisor and the rounding from it
+    precision : of the arithmetic it will run in, for kernels that depend on its rounding or smallest divisor
     parameters : those of `CATALOGUE[name].parameters()`
 
     Raises

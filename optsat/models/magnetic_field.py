@@ -47,7 +47,9 @@ class TiltedDipole:
 
         t, r_N = ca.SX.sym("t"), ca.SX.sym("r_N", 3)
         shape = self._shape(t, r_N)
-        return _of_place("magnetic_direction", t, r_N, Port("direction_N", (3,), "-"), shape / norm(shape))
+        return _of_place(
+            "magnetic_direction", t, r_N, Port("direction_N", (3,), "-", unit_norm=1e-3), shape / norm(shape)
+        )
 
     def _shape(self, t: Value, r_N: Value) -> Value:
         import casadi as ca

@@ -12,12 +12,12 @@ from optsat.errors import InputError
 from optsat.models.earth import GRAVITATIONAL_PARAMETER
 from optsat.models.parameters import check_scalar
 from optsat.port import Port
+from optsat.symbolic.attitude_functions import QUATERNION
 from optsat.symbolic.generated_function import GeneratedFunction, generate
 from optsat.symbolic.integrate import rk4_step
 
 _ROUNDING = 1e-9
 
-_Q = Port("q_BN", (4,), "-")
 _OMEGA = Port("omega_BN_B", (3,), "rad/s")
 _TORQUE = Port("torque_B", (3,), "N m")
 
@@ -57,7 +57,7 @@ class RigidBody:
         q, omega, torque = ca.SX.sym("q_BN", 4), ca.SX.sym("omega_BN_B", 3), ca.SX.sym("torque_B", 3)
         return generate(
             "rigid_body",
-            inputs=[(_Q, q), (_OMEGA, omega), (_TORQUE, torque)],
+            inputs=[(QUATERNION, q), (_OMEGA, omega), (_TORQUE, torque)],
             outputs=[
                 (Port("q_dot_BN", (4,), "1/s"), quaternion.derivative(q, omega)),
                 (Port("omega_dot_BN_B", (3,), "rad/s^2"), self._acceleration(omega, torque)),
@@ -81,7 +81,7 @@ class RigidBody:
         up_B = quaternion.transform(q, r_N / distance)
         torque = 3 * gravitational_parameter / distance**3 * ca.cross(up_B, ca.DM(self.inertia_B) @ up_B)
         return generate(
-            "gravity_gradient", inputs=[(_Q, q), (Port("r_N", (3,), "m"), r_N)], outputs=[(_TORQUE, torque)]
+            "gravity_gradient", inputs=[(QUATERNION, q), (Port("r_N", (3,), "m"), r_N)], outputs=[(_TORQUE, torque)]
         )
 
     def _acceleration(self, omega: Value, torque: Value) -> Value:

@@ -27,7 +27,7 @@ class Sun:
         return generate(
             "sun_direction",
             inputs=[(Port("t", (), "s"), t)],
-            outputs=[(Port("sun_N", (3,), "-"), self._direction(t))],
+            outputs=[(Port("sun_N", (3,), "-", unit_norm=1e-3), self._direction(t))],
         )
 
     def eclipse(self) -> GeneratedFunction:
@@ -42,7 +42,7 @@ class Sun:
         return generate(
             "eclipse",
             inputs=[(Port("t", (), "s"), t), (Port("r_N", (3,), "m"), r_N)],
-            outputs=[(Port("in_shadow", (), "-"), dark)],
+            outputs=[(Port("in_shadow", (), "-", lower=0.0, upper=1.0), dark)],
         )
 
     def _direction(self, t: Value) -> Value:

@@ -63,7 +63,7 @@ def rk4_step(
         current[name] = current[name] / ca.norm_2(current[name])
     return generate(
         f"{derivative.name}_step",
-        inputs=[*((port, symbols[port.name]) for port in derivative.inputs), (Port("dt", (), "s"), dt)],
+        inputs=[*((port, symbols[port.name]) for port in derivative.inputs), (Port("dt", (), "s", lower=0.0), dt)],
         outputs=[(port, current[port.name]) for port in ports],
     )
 

@@ -29,7 +29,7 @@ class Port:
         from 1 by more than this number
     counted : how many of the rows hold data is told at run time; the others repeat row 0, or hold `padding`
     safe : what a result holds when a check failed, one number or one for each entry; unless given the identity
-        quaternion or first axis where `unit_norm`, the identity matrix where `positive_definite`, else 0 within range
+        quaternion, matrix or first axis where `unit_norm`, the identity where `positive_definite`, else 0 within range
 
     Raises
     ------

@@ -41,7 +41,8 @@ def safe_values(port: "Port") -> tuple[float, ...]:
         return port.safe
     if port.safe is not None:
         return (port.safe,) * size
-    if port.positive_definite:
+    is_square = len(port.shape) == 2 and port.shape[0] == port.shape[1]
+    if port.positive_definite or (port.unit_norm is not None and is_square):
         n = port.shape[0]
         return tuple(float(k % (n + 1) == 0) for k in range(size))
     if port.unit_norm is not None or port.direction is not None:

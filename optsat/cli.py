@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from optsat.commands import attitude, bench, demo, doctor, simulate, study, verify
+from optsat.commands import attitude, bench, demo, doctor, export, simulate, study, verify
 from optsat.commands.output import note
 from optsat.errors import OptsatError
 
@@ -56,6 +56,9 @@ app.command("attitude", epilog="Example: optsat attitude log.csv --window 60 --p
 app.command("verify", epilog="Example: optsat verify certificate.json")(verify.verify_command)
 app.command("simulate", epilog="Example: optsat simulate scenario.toml --out log.csv --seed 1")(
     simulate.simulate_command
+)
+app.command("export", epilog="Example: optsat export rigid_body_step --target cortex-m7 --out flight")(
+    export.export_command
 )
 app.add_typer(study.app, name="study", epilog="Example: optsat study list")
 app.command("bench", epilog="Example: optsat bench kernels --json")(bench.bench_command)

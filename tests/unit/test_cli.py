@@ -19,7 +19,7 @@ COMMANDS: tuple[list[str], ...] = (
     [],
     *(["demo"], ["attitude"], ["verify"], ["simulate"]),
     *(["study"], ["study", "list"], ["study", "run"]),
-    *(["bench"], ["doctor"]),
+    *(["export"], ["bench"], ["doctor"]),
 )
 
 

@@ -103,6 +103,14 @@ CATALOGUE: Mapping[str, Entry] = {
     "sun": Entry(
         "optsat.export.model_kernels:sun", "direction of the Sun, and whether a place is in the Earth's shadow"
     ),
+    **{
+        f"wahba_{n}": Entry(
+            "optsat.estimators.wahba_quartic:wahba_quartic",
+            f"attitude of least weighted squared error from {n} vectors, with its margin of observability",
+            {"vectors": n},
+        )
+        for n in range(2, 11)
+    },
 }
 """Entry by public name."""
 

@@ -111,6 +111,10 @@ CATALOGUE: Mapping[str, Entry] = {
         )
         for n in range(2, 11)
     },
+    "certified_two_vector": Entry(
+        "optsat.estimators.certified_pair:certified_two_vector",
+        "attitude from two vectors of bounded error, with the angle that its error never exceeds",
+    ),
 }
 """Entry by public name."""
 

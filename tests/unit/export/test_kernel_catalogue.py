@@ -25,6 +25,7 @@ OPERATIONS = {
     "rigid_body_step": 275,
     "magnetic_field": 35,
     "sun": 44,
+    "certified_two_vector": 1325,
     **{f"wahba_{n}": 399 + 21 * n for n in range(2, 11)},
 }
 

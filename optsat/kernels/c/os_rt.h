@@ -14,8 +14,14 @@
 
 #ifdef OS_REAL_IS_FLOAT
 typedef float os_real_t;
+#define OS_EPSILON FLT_EPSILON
+#define OS_REAL_MAX FLT_MAX
+#define OS_REAL_MIN FLT_MIN
 #else
 typedef double os_real_t;
+#define OS_EPSILON DBL_EPSILON
+#define OS_REAL_MAX DBL_MAX
+#define OS_REAL_MIN DBL_MIN
 #endif
 
 /* The values are fixed for ever. */
@@ -57,6 +63,15 @@ static inline os_real_t os_fmax(os_real_t a, os_real_t b)
 static inline os_real_t os_fmin(os_real_t a, os_real_t b)
 {
     return (isnan(b) || (a <= b)) ? a : b;
+}
+
+static inline bool os_all_finite(const os_real_t *x, int32_t n)
+{
+    bool finite = true;
+    for (int32_t i = 0; i < n; ++i) {
+        finite = finite && (os_fabs(x[i]) <= OS_REAL_MAX);
+    }
+    return finite;
 }
 
 #endif

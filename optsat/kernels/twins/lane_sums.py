@@ -1,0 +1,15 @@
+"""Lane sums: sums along a vector as the templates form them."""
+
+import numpy as np
+
+from optsat.arrays import Array
+from optsat.kernels.sizes import LANES
+
+
+def dot(a: Array, b: Array) -> float:
+    """Return the sum of products of two vectors whose length is a multiple of `LANES`."""
+    lanes = np.zeros(LANES)
+    for begin in range(0, len(a), LANES):
+        lanes = lanes + a[begin : begin + LANES] * b[begin : begin + LANES]
+    s0, s1, s2, s3, s4, s5, s6, s7 = lanes
+    return float(((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)))

@@ -79,7 +79,7 @@ def export_c(
     with tempfile.TemporaryDirectory(prefix="optsat-export-") as temporary:
         for name, text in draft.items():
             (Path(temporary) / name).write_text(text, encoding="utf-8")
-        found = verify(bundle.names, Path(temporary), bundle.target, bundle.precision)
+        found = verify(bundle, Path(temporary))
     check_answers(found, bundle.allowed)
     texts = bundle.texts({name: _measured(name, found) for name in bundle.names})
     export = Export(

@@ -1,12 +1,18 @@
 """Object file: what a compiled kernel holds, needs and puts on the stack, measured by the target's binary tools."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from optsat.export.target import Target
 from optsat.export.tools import ToolError, find_tool, run_tool
+
+EXACT = ("sqrt", "fabs", "floor", "ceil", "copysign")
+"""Functions of C that give the same bits everywhere; most compilers need no library for them."""
+
+COMPILER_SUPPORT = ("__aeabi_", "memcpy", "memset")
+"""Beginnings of names that compilers call where the processor lacks an instruction, and to move structures."""
 
 _NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "([^"]*)"', re.MULTILINE)
 _EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', re.MULTILINE)
@@ -52,6 +58,21 @@ def examine(path: Path, target: Target) -> ObjectFile:
         stack=stated[0],
         outside=stated[1],
     )
+
+
+def faults(found: ObjectFile, functions: Sequence[str], libm: Sequence[str]) -> list[str]:
+    """Return what a flight kernel must not hold or need, one sentence each.
+
+    functions : that it exports; libm : functions of the mathematical library that its model uses
+    """
+    allowed = {f"{name}{suffix}" for name in (*libm, *EXACT) for suffix in ("", "f")}
+    foreign = [name for name in found.undefined if name not in allowed and not name.startswith(COMPILER_SUPPORT)]
+    extra = sorted(set(found.defined) - set(functions))
+    return [
+        *([f"it has {found.data} bytes of data and {found.bss} of bss"] if found.data or found.bss else []),
+        *([f"it needs {', '.join(foreign)}"] if foreign else []),
+        *([f"it exports {', '.join(extra)}"] if extra else []),
+    ]
 
 
 def stack_bound(call_graph: str) -> tuple[int, tuple[str, ...]]:

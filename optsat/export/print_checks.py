@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from optsat.export.c_text import real
 from optsat.port import Port
 
-LIMIT = "OS_REAL_MAX"
+LIMIT = "OS_LARGEST"
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ class Vector:
 
 
 def draw_vectors(definition: Definition, interface: Interface, good: int = GOOD) -> list[Vector]:
-    """Return `good` vectors within the checks of the ports, and then one for each way to break a check.
+    """Return `good` vectors within the checks of the ports, and then one for each limit and each way to break a check.
 
     The seed is made of the kernel's name: the same vectors everywhere.
     """
@@ -65,7 +65,7 @@ def draw(interface: Interface, rng: np.random.Generator) -> tuple[Array, int]:
 
 
 def spoilt(interface: Interface, x: Array, count: int) -> Iterator[tuple[Array, int]]:
-    """Yield the arguments with one check after another broken, each alone."""
+    """Yield the arguments with one check after another broken, each alone, and those at the ends of a range."""
     for port in interface.source.inputs:
         first = interface.first_in[port.name]
         entries = range(first, first + port.size)
@@ -74,6 +74,9 @@ def spoilt(interface: Interface, x: Array, count: int) -> Iterator[tuple[Array, 
             changes += [{k: 2.0 * x[k] for k in entries}, dict.fromkeys(entries, 0.0)]
         if port.direction is not None:
             changes += [dict.fromkeys(entries[: port.row_length], 0.0)]
+        for limit in (port.lower, port.upper):
+            if limit is not None and not port.positive_definite and float(np.float32(limit)) == limit:
+                changes += [{entries[-1]: limit}]
         if port.lower is not None:
             changes += [{entries[0]: port.lower - 1.0 - abs(port.lower)}]
         if port.upper is not None:
@@ -95,7 +98,8 @@ def _drawn(port: Port, rng: np.random.Generator) -> Array:
     if port.positive_definite:
         n = port.shape[0]
         root = rng.normal(size=(n, n))
-        return np.asarray(root @ root.T / n + 0.1 * np.eye(n))
+        drawn = root @ root.T / n + 0.1 * np.eye(n)
+        return np.asarray(drawn if port.upper is None else drawn * min(1.0, 0.9 * port.upper / drawn.max()))
     values = np.asarray(rng.normal(size=port.shape))
     if port.direction is not None:
         return np.asarray(values * 10.0 ** rng.uniform(-2.0, 2.0, (*port.shape[:-1], 1)))

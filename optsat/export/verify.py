@@ -1,16 +1,15 @@
 """Verify: compile an exported folder for its target, measure the objects, and replay the stored answers."""
 
 import re
-import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from optsat.errors import OptsatError
 from optsat.export.build_files import WARNINGS, flags
-from optsat.export.object_file import ObjectFile, examine
-from optsat.export.target import Precision, Target
-from optsat.export.tools import find_tool, run_tool
+from optsat.export.bundle import Bundle
+from optsat.export.object_file import ObjectFile, examine, faults
+from optsat.export.tools import ToolError, find_tool, run_tool
 
 _LINE = re.compile(r"^(\w+) (passed|FAILED) (.+)$", re.MULTILINE)
 
@@ -49,13 +48,14 @@ class Verification:
     missing: tuple[str, ...]
 
 
-def verify(names: Sequence[str], folder: Path, target: Target, precision: Precision) -> Verification:
+def verify(bundle: Bundle, folder: Path) -> Verification:
     """Compile and run what stands in `folder`, which also takes the objects; a missing tool is told, not an error.
 
     Raises
     ------
-    ToolError : a compiler or simulator fails.
+    ToolError : a compiler or simulator fails, or an object file holds or needs what no flight kernel may.
     """
+    target, precision = bundle.target, bundle.precision
     compiler = find_tool(*target.compilers)
     if compiler is None:
         return Verification("", {}, {}, (f"Not compiled: no {' or '.join(target.compilers)} on the path.",))
@@ -63,14 +63,17 @@ def verify(names: Sequence[str], folder: Path, target: Target, precision: Precis
     measuring = ["-fstack-usage", "-fcallgraph-info=su"] if _is_gcc(compiler, folder) else []
     missing = [] if measuring else [f"Stack not measured: {version} does not state it; gcc does."]
     objects = {}
-    for name in names:
+    for interface in bundle.interfaces:
+        name = interface.source.name
         command = [compiler, *flags(target, precision), *WARNINGS, *measuring, "-c", f"{name}.c", "-o", f"{name}.o"]
         run_tool(command, folder)
         objects[name] = examine(folder / f"{name}.o", target)
-    if target.simulator and shutil.which(target.simulator[0]) is None:
+        if found := faults(objects[name], interface.functions, interface.source.libm):
+            raise ToolError(f"{name} is no flight code, compiled with {version}: {'; '.join(found)}.")
+    if target.simulator and find_tool(target.simulator[0]) is None:
         missing.append(f"Not run: {target.simulator[0]} is not on the path.")
         return Verification(version, objects, {}, tuple(missing))
-    return Verification(version, objects, replay(names, folder, target, precision, compiler), tuple(missing))
+    return Verification(version, objects, replay(bundle, folder, compiler), tuple(missing))
 
 
 def check_answers(found: Verification, allowed: Mapping[str, float]) -> None:
@@ -97,19 +100,28 @@ def check_answers(found: Verification, allowed: Mapping[str, float]) -> None:
         raise SelfTestError(f"{name} on {said.where}: {fault}. Nothing was written.")
 
 
-def replay(
-    names: Sequence[str], folder: Path, target: Target, precision: Precision, compiler: str
-) -> dict[str, Replay]:
+def replay(bundle: Bundle, folder: Path, compiler: str) -> dict[str, Replay]:
     """Link the self-tests in `folder` and return what they say by kernel.
 
     Raises
     ------
     ToolError : the link or the run fails, or a kernel says nothing.
     """
+    names, target = bundle.names, bundle.target
     sources = [f"{name}{end}" for name in names for end in (".c", "_selftest.c")]
     extra = [file.rpartition("/")[2] for file in target.files if file.endswith(".c")]
     program = f"selftest-{target.name}"
-    command = [compiler, *flags(target, precision), "selftest.c", *extra, *sources, *target.link, "-lm", "-o", program]
+    command = [
+        compiler,
+        *flags(target, bundle.precision),
+        "selftest.c",
+        *extra,
+        *sources,
+        *target.link,
+        "-lm",
+        "-o",
+        program,
+    ]
     run_tool(command, folder)
     accept = tuple(range(len(names) + 1))
     said = run_tool([*target.simulator, f"./{program}"], folder, accept=accept)

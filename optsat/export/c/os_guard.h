@@ -6,10 +6,10 @@
 #include "os_rt.h"
 
 #ifdef OS_REAL_IS_FLOAT
-#define OS_REAL_MAX FLT_MAX
+#define OS_LARGEST FLT_MAX
 #define OS_ASYMMETRY ((os_real_t)0x1p-12)
 #else
-#define OS_REAL_MAX DBL_MAX
+#define OS_LARGEST DBL_MAX
 #define OS_ASYMMETRY ((os_real_t)0x1p-26)
 #endif
 
@@ -17,7 +17,7 @@ static inline uint32_t os_not_finite(const os_real_t *v, uint32_t count)
 {
     uint32_t bad = 0U;
     for (uint32_t k = 0U; k < count; k++) {
-        bad += (os_fabs(v[k]) <= OS_REAL_MAX) ? 0U : 1U;
+        bad += (os_fabs(v[k]) <= OS_LARGEST) ? 0U : 1U;
     }
     return bad;
 }
@@ -78,7 +78,7 @@ static inline uint32_t os_scale_rows(const os_real_t *v, uint32_t rows, uint32_t
         for (uint32_t k = 0U; k < length; k++) {
             largest = os_fmax(largest, os_fabs(row[k]));
         }
-        const bool has_direction = (largest > (os_real_t)0.0) && (largest <= OS_REAL_MAX);
+        const bool has_direction = (largest > (os_real_t)0.0) && (largest <= OS_LARGEST);
         const os_real_t divisor = has_direction ? largest : (os_real_t)1.0;
         for (uint32_t k = 0U; k < length; k++) {
             const os_real_t entry = row[k] / divisor;

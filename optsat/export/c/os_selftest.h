@@ -8,12 +8,12 @@
 #include "os_rt.h"
 
 #ifdef OS_REAL_IS_FLOAT
-#define OS_EPSILON ((double)FLT_EPSILON)
-#define OS_LEAST ((double)FLT_MIN)
+#define OS_SPACING ((double)FLT_EPSILON)
+#define OS_LEAST_NORMAL ((double)FLT_MIN)
 typedef uint32_t os_bits_t;
 #else
-#define OS_EPSILON DBL_EPSILON
-#define OS_LEAST DBL_MIN
+#define OS_SPACING DBL_EPSILON
+#define OS_LEAST_NORMAL DBL_MIN
 typedef uint64_t os_bits_t;
 #endif
 
@@ -45,14 +45,14 @@ static inline void os_tally_status(os_tally_t *tally, uint32_t got, uint32_t wan
 
 static inline void os_tally_port(os_tally_t *tally, const os_real_t *got, const double *want, uint32_t count)
 {
-    double largest = OS_LEAST;
+    double largest = OS_LEAST_NORMAL;
     for (uint32_t k = 0U; k < count; k++) {
         largest = (fabs(want[k]) > largest) ? fabs(want[k]) : largest;
     }
     for (uint32_t k = 0U; k < count; k++) {
         const os_real_t rounded = (os_real_t)want[k];
         const double difference = fabs((double)got[k] - want[k]);
-        const double units = difference / (OS_EPSILON * largest);
+        const double units = difference / (OS_SPACING * largest);
         os_bits_t a = 0U;
         os_bits_t b = 0U;
         (void)memcpy(&a, &got[k], sizeof a);

@@ -5,10 +5,12 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optsat.arrays import Array
 from optsat.attitude.admissible_set import AdmissibleSet
 from optsat.errors import UnsupportedFormError
+from optsat.smooth_map import SmoothMap, SymbolicMap
 from optsat.solution import Termination
 
 F = TypeVar("F")
@@ -102,3 +104,45 @@ class CoverForm:
     q_BN: Array
     weights: Array
     scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class MinMaxForm:
+    """Minimise t over x (n,) and t subject to
+
+        sign_i F_{objective_i}(x) - level_i <= weight_i t        for the rows i = 1..m, weight_i >= 0, one of them > 0,
+        constraint_lower <= g(x) <= constraint_upper,  linear_lower <= A x <= linear_upper,  lower <= x <= upper.
+
+    A row of weight 0 is a constraint. `x` of a point is x alone; `dual` is empty where the solver knows no multipliers,
+    else those of the rows (m,) >= 0, then of g, A x and x, positive where an upper bound presses, negative where a
+    lower one does.
+    """
+
+    objectives: SmoothMap
+    objective: NDArray[np.intp]
+    sign: Array
+    level: Array
+    weight: Array
+    constraints: SmoothMap
+    constraint_lower: Array
+    constraint_upper: Array
+    A: Array
+    linear_lower: Array
+    linear_upper: Array
+    lower: Array
+    upper: Array
+    start: Array
+
+    @property
+    def symbolic(self) -> bool:
+        """Whether all functions are CasADi's, so that exact derivatives of every order exist."""
+        return isinstance(self.objectives, SymbolicMap) and isinstance(self.constraints, SymbolicMap)
+
+    def rows(self, objectives: Array) -> Array:
+        """Return sign F - level (m,) of the values F (k,)."""
+        return np.asarray(self.sign * objectives[self.objective] - self.level)
+
+    def factor(self, objectives: Array) -> float:
+        """Return the least t that the rows of positive weight allow, for the values F (k,)."""
+        soft = self.weight > 0
+        return float(np.max(self.rows(objectives)[soft] / self.weight[soft]))

@@ -7,6 +7,7 @@ from optsat.solve import Solver
 from optsat.solvers.cell_cover import CellCoverSolver
 from optsat.solvers.clarabel import Clarabel
 from optsat.solvers.davenport import Davenport
+from optsat.solvers.ipopt import Ipopt
 from optsat.solvers.scaled_semidefinite import ScaledSemidefinite
 from optsat.solvers.subpaving import SubpavingSolver
 from optsat.solvers.svd import SingularValues
@@ -24,4 +25,5 @@ SOLVERS: tuple[Solver, ...] = (
     CellCoverSolver(),
     SubpavingSolver(),
     Clarabel(),
+    Ipopt(),
 )

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 from conic_problems import INFEASIBLE, SOLVABLE, UNBOUNDED, ConicProblem, outside
@@ -17,6 +18,7 @@ from optsat.attitude.status import AttitudeStatus
 from optsat.errors import InputError, UnsupportedFormError
 from optsat.forms import Point
 from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
+from optsat.problems.goal_attainment import Attainment, GoalAttainment
 from optsat.problems.refined_enclosure import RefinedEnclosure
 from optsat.problems.wahba import Wahba, WahbaAttitude
 from optsat.solution import Proof, Solution, Termination
@@ -123,6 +125,16 @@ def conic_case(name: str, problem: ConicProblem, least: float) -> Case:
     return Case(f"conic: {name}", problem, judge)
 
 
+def min_max_case(name: str, problem: GoalAttainment, factor: float, x: tuple[float, ...]) -> Case:
+    def judge(solution: Solution[Attainment]) -> None:
+        assert solution.proof in (Proof.STATIONARY, Proof.GLOBAL)
+        assert solution.answer.factor == pytest.approx(factor, rel=1e-6, abs=1e-7)
+        np.testing.assert_allclose(solution.answer.x, x, atol=1e-6)
+        assert solution.residuals["kkt"] <= 1e-6
+
+    return Case(f"min-max: {name}", problem, judge)
+
+
 def infeasible(solution: Solution[Point]) -> None:
     form, ray = INFEASIBLE.form, solution.answer.dual
     assert form.b @ ray < 0
@@ -149,6 +161,7 @@ def shared_error() -> tuple[Array, float]:
     return quaternion.compose(Q, (0, 0, -np.sin(t / 2), np.cos(t / 2))), float(loss)
 
 
+LINE = ca.SX.sym("x")
 EXACT_PAIR_EPS = np.array([5e-6, 0.05])
 THREE_EPS = np.full(3, 0.1)
 EQUAL_AXES_BOUND = float(2 * np.arcsin(np.sqrt(0.75 * 2 * np.sin(0.05) ** 2)))
@@ -205,6 +218,7 @@ CASES = [
     cover_case(
         "accurate pair and a coarse vector", body(AXES), AXES, np.array([0.01, 0.01, 0.3]), 0.01 * np.sqrt(2) * 0.999
     ),
+    min_max_case("parabola and line, x <= 1", GoalAttainment(LINE, [LINE**2, 2 - LINE], 0.0, ub=1.0), 1.0, (1.0,)),
     *(conic_case(name, problem, least) for name, (problem, least) in SOLVABLE.items()),
     Case("conic: infeasible", INFEASIBLE, infeasible),
     Case("conic: unbounded", UNBOUNDED, unbounded),

@@ -1,0 +1,256 @@
+"""Attain: goals and worst cases of several objectives, by the first engine whose answer stands re-evaluation."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from optsat.errors import InputError, explain_unknown_options, nearest_name
+from optsat.forms import Point
+from optsat.multistart import sobol_starts
+from optsat.solution import Proof, Solution, Termination
+from optsat.solve import Solver, solve
+
+if TYPE_CHECKING:
+    from optsat.problems.goal_attainment import Attainment, GoalAttainment
+    from optsat.problems.minimax import Minimax
+
+# factors closer than this, relative to their size (at least 1), count as equal
+_SAME = 1e-9
+
+
+@explain_unknown_options
+def goal_attain(
+    x: Any,
+    objectives: Any,
+    goals: ArrayLike,
+    weights: ArrayLike | None = None,
+    *,
+    absolute: bool | Sequence[int] = (),
+    exact: Sequence[int] = (),
+    lb: ArrayLike | None = None,
+    ub: ArrayLike | None = None,
+    A: ArrayLike | None = None,
+    b: ArrayLike | None = None,
+    Aeq: ArrayLike | None = None,
+    beq: ArrayLike | None = None,
+    constraints: Any = None,
+    constraints_lb: ArrayLike | None = None,
+    constraints_ub: ArrayLike | None = None,
+    parameters: Any = None,
+    parameter_values: ArrayLike | None = None,
+    start: "ArrayLike | Solution[Attainment] | None" = None,
+    starts: int = 1,
+    seed: int = 0,
+    engine: "str | Solver" = "auto",
+) -> "Solution[Attainment]":
+    """Return the x whose objectives attain their goals best: minimise t subject to F_i(x) - goal_i <= w_i t.
+
+    x : the unknowns, a CasADi column of symbols (SX or MX); or, where objectives are functions, the start (n,)
+    objectives : CasADi expression (k,) or a sequence of them; a CasADi Function, a GeneratedFunction or a Python
+    callable of x, or of (x, p) when `parameter_values` are given
+    goals (k,); weights (k,), 1 when None : w > 0 may be missed by w t; w = 0 is a constraint, F <= goal; w < 0 asks
+    for at least the goal, goal - F <= |w| t. Weights |goal| make t a relative miss.
+    absolute : indices (or True, all) whose deviation counts in both directions, |F_i - goal_i| <= |w_i| t
+    exact : indices that must equal their goals, F_i = goal_i, whatever their weights
+    lb, ub (n,) or scalar; A x <= b; Aeq x = beq; constraints : as objectives, constraints_lb <= g(x) <=
+    constraints_ub, g(x) <= 0 when neither is given
+    parameters, parameter_values : CasADi symbols that expressions may use, and their numbers
+    start : (n,), moved into the bounds, or an earlier solution of the same problem (warm start); with symbols and no
+    start the middle of the bounds, 0 where there is none
+    starts, seed : number of starts, the others from a Sobol sequence over the bounds; the best answer is returned
+    engine : "auto" tries the engines of the table in turn until one's answer passes re-evaluation; or a name or solver
+
+    Returns a Solution: `answer.x`, `.objectives`, `.factor` (t re-evaluated), `.active`, `.multipliers`; `proof` is
+    GLOBAL, STATIONARY, FEASIBLE, NOTHING or INFEASIBLE; `residuals["kkt"]` recomputed; `stats["runs"]` which engine
+    ran and how it was judged.
+
+    MATLAB's fgoalattain(fun, x0, goal, weight, A, b, Aeq, beq, lb, ub, nonlcon): fun -> objectives, x0 -> x or start,
+    goal -> goals, weight -> weights, EqualityGoalCount -> absolute (indices instead of a count), nonlcon's c ->
+    constraints, its ceq -> rows with constraints_lb = constraints_ub = 0, attainfactor -> answer.factor, lambda ->
+    answer's multipliers, exitflag -> proof and termination.
+
+    Raises
+    ------
+    InputError : an argument that cannot be used; the message names it.
+    Source: Gembicki & Haimes (1975).
+    """
+    from optsat.problems.goal_attainment import GoalAttainment
+
+    problem = GoalAttainment(
+        x,
+        objectives,
+        goals,
+        weights,
+        absolute,
+        exact,
+        lb,
+        ub,
+        A,
+        b,
+        Aeq,
+        beq,
+        constraints,
+        constraints_lb,
+        constraints_ub,
+        parameters,
+        parameter_values,
+        start.answer.x if isinstance(start, Solution) else start,
+    )
+    return _best(problem, start, starts, seed, engine)
+
+
+@explain_unknown_options
+def minimax(
+    x: Any,
+    objectives: Any,
+    *,
+    absolute: bool | Sequence[int] = (),
+    lb: ArrayLike | None = None,
+    ub: ArrayLike | None = None,
+    A: ArrayLike | None = None,
+    b: ArrayLike | None = None,
+    Aeq: ArrayLike | None = None,
+    beq: ArrayLike | None = None,
+    constraints: Any = None,
+    constraints_lb: ArrayLike | None = None,
+    constraints_ub: ArrayLike | None = None,
+    parameters: Any = None,
+    parameter_values: ArrayLike | None = None,
+    start: "ArrayLike | Solution[Attainment] | None" = None,
+    starts: int = 1,
+    seed: int = 0,
+    engine: "str | Solver" = "auto",
+) -> "Solution[Attainment]":
+    """Return the x whose largest objective is least: minimise max_i F_i(x).
+
+    absolute : indices (or True, all) whose absolute values |F_i(x)| count
+    `answer.factor` is the largest objective. All other arguments and the result are those of `goal_attain`.
+
+    MATLAB's fminimax(fun, x0, A, b, Aeq, beq, lb, ub, nonlcon): fun -> objectives, x0 -> x or start, maxfval ->
+    answer.factor, AbsoluteMaxObjectiveCount -> absolute (indices instead of a count), nonlcon, lambda and exitflag as
+    for `goal_attain`.
+
+    Raises
+    ------
+    InputError : an argument that cannot be used; the message names it.
+    """
+    from optsat.problems.minimax import Minimax
+
+    problem = Minimax(
+        x,
+        objectives,
+        absolute,
+        lb,
+        ub,
+        A,
+        b,
+        Aeq,
+        beq,
+        constraints,
+        constraints_lb,
+        constraints_ub,
+        parameters,
+        parameter_values,
+        start.answer.x if isinstance(start, Solution) else start,
+    )
+    return _best(problem, start, starts, seed, engine)
+
+
+@dataclass(frozen=True)
+class EngineRun:
+    """One run of one engine, judged by re-evaluation.
+
+    start : number of the start; kkt, violation : recomputed residuals; seconds : wall time of the run
+    verdict : why the answer was taken, or why the next engine was tried
+    """
+
+    engine: str
+    start: int
+    proof: Proof
+    termination: Termination
+    factor: float
+    kkt: float
+    violation: float
+    iterations: int
+    seconds: float
+    verdict: str
+
+
+def _best(
+    problem: "GoalAttainment | Minimax",
+    start: "ArrayLike | Solution[Attainment] | None",
+    starts: int,
+    seed: int,
+    engine: "str | Solver",
+) -> "Solution[Attainment]":
+    form = problem.lower()
+    engines = _engines(form, engine)
+    found: list[Solution[Attainment]] = []
+    runs: list[EngineRun] = []
+    for number, x in enumerate(sobol_starts(form.start, form.lower, form.upper, starts, seed)):
+        dual = start.answer.dual if number == 0 and isinstance(start, Solution) else np.zeros(0)
+        for each in engines:
+            began = perf_counter()
+            solution = solve(problem, each, Point(x, dual, Termination.CONVERGED))
+            runs.append(_judged(solution, each.name, number, perf_counter() - began))
+            found.append(solution)
+            if solution.proof in (Proof.STATIONARY, Proof.GLOBAL, Proof.INFEASIBLE):
+                break
+        if found[-1].proof in (Proof.GLOBAL, Proof.INFEASIBLE):
+            break
+    best = _chosen(found)
+    return replace(best, stats={**best.stats, "runs": tuple(runs)})
+
+
+def _engines(form: object, engine: "str | Solver") -> "list[Solver]":
+    from optsat.solvers import SOLVERS
+
+    if not isinstance(engine, str):
+        return [engine]
+    fitting = [solver for solver in SOLVERS if solver.accepts(form)]
+    if engine == "auto":
+        return fitting
+    names = [solver.name for solver in fitting]
+    if engine not in names:
+        raise InputError(f"`engine` {engine!r} cannot solve this problem or is unknown.{nearest_name(engine, names)}")
+    return [fitting[names.index(engine)]]
+
+
+def _judged(solution: "Solution[Attainment]", engine: str, start: int, seconds: float) -> EngineRun:
+    kkt, violation = (solution.residuals.get(name, float("inf")) for name in ("kkt", "violation"))
+    if solution.proof in (Proof.STATIONARY, Proof.GLOBAL, Proof.INFEASIBLE):
+        verdict = f"taken: {solution.proof.value}"
+    elif solution.proof is Proof.FEASIBLE:
+        verdict = f"not stationary: KKT residual {kkt:.2g}"
+    elif solution.answer.violated:
+        verdict = "infeasible: " + ", ".join(f"{name} by {by:.2g}" for name, by in solution.answer.violated.items())
+    else:
+        verdict = "a function is not finite at its answer"
+    return EngineRun(
+        engine=engine,
+        start=start,
+        proof=solution.proof,
+        termination=solution.termination,
+        factor=solution.answer.factor,
+        kkt=kkt,
+        violation=violation,
+        iterations=int(solution.stats["iterations"]),
+        seconds=seconds,
+        verdict=verdict,
+    )
+
+
+def _chosen(found: "list[Solution[Attainment]]") -> "Solution[Attainment]":
+    """Return the feasible solution of least factor, of equal ones the best proven; else the least infeasible."""
+    strength = [Proof.NOTHING, Proof.FEASIBLE, Proof.STATIONARY, Proof.INFEASIBLE, Proof.GLOBAL]
+    feasible = [each for each in found if each.proof in (Proof.FEASIBLE, Proof.STATIONARY, Proof.GLOBAL)]
+    if not feasible:
+        proven = [each for each in found if each.proof is Proof.INFEASIBLE]
+        return min(proven or found, key=lambda each: each.residuals.get("violation", float("inf")))
+    least = min(each.answer.factor for each in feasible)
+    equal = [each for each in feasible if each.answer.factor <= least + _SAME * max(1.0, abs(least))]
+    return max(equal, key=lambda each: (strength.index(each.proof), -each.residuals["kkt"]))

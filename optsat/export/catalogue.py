@@ -115,6 +115,14 @@ CATALOGUE: Mapping[str, Entry] = {
         "optsat.estimators.certified_pair:certified_two_vector",
         "attitude from two vectors of bounded error, with the angle that its error never exceeds",
     ),
+    "extended_filter_7": Entry(
+        "optsat.estimators.attitude_filter:extended_filter_7",
+        "extended Kalman filter step of attitude and angular velocity, star tracker and gyro",
+    ),
+    "unscented_filter_7": Entry(
+        "optsat.estimators.attitude_filter:unscented_filter_7",
+        "unscented Kalman filter step of attitude and angular velocity, star tracker and gyro",
+    ),
 }
 """Entry by public name."""
 

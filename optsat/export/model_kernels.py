@@ -4,12 +4,9 @@ from collections.abc import Sequence
 
 from optsat.models.epoch import Epoch
 from optsat.models.magnetic_field import TiltedDipole
-from optsat.models.rigid_body import RigidBody
+from optsat.models.rigid_body import EXAMPLE_INERTIA, RigidBody
 from optsat.models.sun import Sun
 from optsat.symbolic.generated_function import GeneratedFunction, generate
-
-EXAMPLE_INERTIA = ((80.0, 0.0, 0.0), (0.0, 80.0, 0.0), (0.0, 0.0, 4.0))
-"""Inertia [kg m^2] of the satellite of the example scenario."""
 
 EXAMPLE_EPOCH = "2021-03-20T12:00:00Z"
 """Epoch of the example scenario, which the kernels count t from unless told otherwise."""

@@ -16,6 +16,9 @@ from optsat.symbolic.attitude_functions import QUATERNION
 from optsat.symbolic.generated_function import GeneratedFunction, generate
 from optsat.symbolic.integrate import rk4_step
 
+EXAMPLE_INERTIA = ((80.0, 0.0, 0.0), (0.0, 80.0, 0.0), (0.0, 0.0, 4.0))
+"""Inertia [kg m^2] of the satellite of the example scenario."""
+
 _ROUNDING = 1e-9
 
 _OMEGA = Port("omega_BN_B", (3,), "rad/s")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from single_precision import in_single_precision
+from single_precision import SinglePrecision
 
 from optsat.arrays import Array
 from optsat.attitude import dcm, quaternion
@@ -30,7 +30,7 @@ def test_the_truth_is_within_the_bound(decades: tuple[float, float], spread: flo
     # every error as long as its bound allows
     across = unit(np.cross(y, rng.standard_normal(y.shape)))
     b = np.cos(eps)[..., None] * y + np.sin(eps)[..., None] * across
-    q, bound, weights, status = in_single_precision(kernel, b, r, eps)
+    q, bound, weights, status = SinglePrecision(kernel).batch(b, r, eps)
     assert np.all(np.isfinite(np.column_stack((q, bound, weights, status))))
     assert np.all(status != 2)
     assert np.all(quaternion.error_angle(unit(q), truth) <= bound)

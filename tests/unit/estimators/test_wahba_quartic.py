@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
-from single_precision import in_single_precision
+from single_precision import SinglePrecision
 
 from optsat.arrays import Array
 from optsat.attitude import quaternion
@@ -201,7 +201,7 @@ def test_in_single_precision(vectors: int) -> None:
     for sigma, spread in ((1e-3, 0.0), (1e-3, 0.1), (0.0, 1e-3), (0.0, 1e-6)):
         exact = drawn(np.random.default_rng(8), 2000, vectors, sigma, spread=spread)
         b, r, weights = (np.asarray(np.float32(value), np.float64) for value in exact)
-        q, value, gap, determined = in_single_precision(kernel, b, r, weights)
+        q, value, gap, determined = SinglePrecision(kernel).batch(b, r, weights)
         best, largest, distance = reference(b, r, weights)
         relative, sure = distance / largest, determined == 1
         assert np.all(np.isfinite(np.column_stack((q, value, gap))))

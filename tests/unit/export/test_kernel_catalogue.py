@@ -26,6 +26,8 @@ OPERATIONS = {
     "magnetic_field": 35,
     "sun": 44,
     "certified_two_vector": 1325,
+    "extended_filter_7": 4924,
+    "unscented_filter_7": 8126,
     **{f"wahba_{n}": 399 + 21 * n for n in range(2, 11)},
 }
 

@@ -52,8 +52,8 @@ def instantiate(
     """Return the kernel `name` of `optsat/kernels/templates/TEMPLATE.c`.
 
     In the text, KERNEL stands for the name of the kernel, KERNEL_N for the size or constant N. The line `/*@sizes*/`
-    becomes an enumeration of the sizes, `/*@tables*/` the constant arrays, `/*@include part*/` the text of part.c. A slot of NX arguments and NY results in a
-    row each, both sums of products such as `N + 2 * M`, becomes
+    becomes an enumeration of the sizes, `/*@tables*/` the constant arrays, `/*@include part*/` the text of part.c. A
+    slot of NX arguments and NY results in a row each, both sums of products such as `N + 2 * M`, becomes
         `/*@leaf f: NX -> NY */`  the function KERNEL_f_leaf(x, y) of straight-line code
         `/*@step f: NX -> NY */`  the function KERNEL_f_body(x, y, work) with a status, of any kernel
 

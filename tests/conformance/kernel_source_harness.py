@@ -20,7 +20,7 @@ STRICT = (
     *("-Werror", "-ffp-contract=off"),
 )
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-FORMS = (("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("clang", "-O2"))
+FORMS = (("gcc", "-O0"), ("gcc", "-O3"), ("clang", "-O2"))
 
 Call = Callable[[Array], tuple[int, Array]]
 

@@ -20,7 +20,7 @@ def twin(n: int) -> Twin:
         y = np.full(n + 1, np.nan)
         with np.errstate(all="ignore"):
             reciprocal, y[n] = _factorise(factor)
-            status = Status.RANGE
+            status, solution = Status.RANGE, y[:n]
             if y[n] > 0.0:
                 solution = _substitute(factor, reciprocal, x[n * n :])
                 status = Status.OK if np.isfinite(solution).all() else Status.OUTPUT

@@ -13,3 +13,8 @@ def dot(a: Array, b: Array) -> float:
         lanes = lanes + a[begin : begin + LANES] * b[begin : begin + LANES]
     s0, s1, s2, s3, s4, s5, s6, s7 = lanes
     return float(((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)))
+
+
+def largest(a: Array) -> float:
+    """Return the largest absolute value of a vector, 0 of none; a NaN counts for nothing."""
+    return float(np.fmax.reduce(np.abs(a), initial=0.0))

@@ -1,26 +1,10 @@
-"""Scalar printer: a program as one C99 function of one sample."""
+"""Scalar printer: a program as one C99 function of one sample, in the real type of `os_rt.h`."""
 
 import math
-from typing import Literal
 
-import numpy as np
-
-from optsat.errors import InputError
 from optsat.kernels.codes import ARITY, LIBM
 from optsat.kernels.expressions import Language, as_number, assignments
-from optsat.kernels.program import Constant, Input, Operation, Pattern, Program, starts
-
-Real = Literal["double", "float"]
-
-PRELUDE = """\
-#include <math.h>
-#include <stdbool.h>
-
-#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
-#error "compile without -ffast-math: NaN, signed zeros and the order of operations are part of the results"
-#endif
-"""
-"""What stands once above the leaves of a file."""
+from optsat.kernels.program import Input, Pattern, Program, starts
 
 OPERATIONS: dict[str, str] = {
     "ADD": "{a} + {b}",
@@ -31,49 +15,41 @@ OPERATIONS: dict[str, str] = {
     "SQ": "{a} * {a}",
     "TWICE": "{a} + {a}",
     "INV": "{one} / {a}",
-    "SQRT": "sqrt{f}({a})",
-    "FABS": "fabs{f}({a})",
-    "FLOOR": "floor{f}({a})",
-    "CEIL": "ceil{f}({a})",
-    # not C's fmax and fmin, which leave open what a tie of +0 and -0 returns
-    "FMAX": "(isnan({b}) || {a} >= {b}) ? {a} : {b}",
-    "FMIN": "(isnan({b}) || {a} <= {b}) ? {a} : {b}",
-    "SIGN": "({a} > {zero}) ? {one} : (({a} < {zero}) ? -{one} : {a})",
-    "COPYSIGN": "isnan({b}) ? fabs{f}({a}) : copysign{f}({a}, {b})",
+    "SQRT": "os_sqrt({a})",
+    "FABS": "os_fabs({a})",
+    "FLOOR": "os_floor({a})",
+    "CEIL": "os_ceil({a})",
+    "FMAX": "os_fmax({a}, {b})",
+    "FMIN": "os_fmin({a}, {b})",
+    "SIGN": "os_sign({a})",
+    "COPYSIGN": "os_copysign({a}, {b})",
     "IF_ELSE_ZERO": "{p} ? {b} : {zero}",
     "LT": "{a} < {b}",
     "LE": "{a} <= {b}",
-    "EQ": "{a} == {b}",
-    "NE": "{a} != {b}",
+    "EQ": "os_equal({a}, {b})",
+    "NE": "!os_equal({a}, {b})",
     "NOT": "!{p}",
     "AND": "{p} && {q}",
     "OR": "{p} || {q}",
     **{
-        code: f"{name}{{f}}({{a}}, {{b}})" if ARITY[code] == 2 else f"{name}{{f}}({{a}})" for code, name in LIBM.items()
+        code: f"os_libm_{name}({{a}}, {{b}})" if ARITY[code] == 2 else f"os_libm_{name}({{a}})"
+        for code, name in LIBM.items()
     },
 }
 """Expression by code."""
 
-SMALLEST_NORMAL_FLOAT = 2.0**-126
 
-
-def print_scalar(program: Program, real: Real = "double", dense: bool = False) -> str:
-    """Return `static inline void NAME_leaf(const REAL *x, REAL *y)` over the arguments and the results in a row each.
+def print_scalar(program: Program, dense: bool = False) -> str:
+    """Return `static inline void NAME_leaf(const os_real_t *x, os_real_t *y)` over arguments and results in a row each.
 
     program : folded, as `lower` returns it
-    All of x is read before any of y is written, so the two may be the same memory.
+    All of x is read before any of y is written, so the two may be the same memory. One text serves double and float.
     dense : matrices hold all their entries, counted by rows as NumPy does, structural zeros of the results stored as 0;
     otherwise their non-zeros alone, counted by columns as CasADi does
-
-    Raises
-    ------
-    InputError : a constant is too large or too small for `float`; the message shows it and the operation that uses it.
     """
-    if real == "float":
-        _check_constants(program)
-    language = _language(program, real, dense)
+    language = _language(program, dense)
     lines = [
-        f"    const {'bool' if each.is_truth else real} {each.variable} = {each.expression};"
+        f"    const {'bool' if each.is_truth else 'os_real_t'} {each.variable} = {each.expression};"
         for each in assignments(program, language)
     ]
     if not any(isinstance(node, Input) for node in program.nodes):
@@ -82,7 +58,7 @@ def print_scalar(program: Program, real: Real = "double", dense: bool = False) -
     return "\n".join(
         [
             f"/* x: {_listed(program.inputs, dense)}; y: {_listed(program.outputs, dense)} */",
-            f"static inline void {program.name}_leaf(const {real} *x, {real} *y)",
+            f"static inline void {program.name}_leaf(const os_real_t *x, os_real_t *y)",
             "{",
             *lines,
             *(stores or ["    (void)y;"]),
@@ -92,31 +68,28 @@ def print_scalar(program: Program, real: Real = "double", dense: bool = False) -
     )
 
 
-def _language(program: Program, real: Real, dense: bool) -> Language:
-    suffix = "f" if real == "float" else ""
+def _language(program: Program, dense: bool) -> Language:
     offsets = [pattern.offsets(dense) for pattern in program.inputs]
     start = starts(program.inputs, dense)
     return Language(
         operations=OPERATIONS,
         number="({p} ? {one} : {zero})",
-        truth="({a} != {zero})",
-        constant=lambda value: _literal(value, real),
+        truth="os_truth({a})",
+        constant=c_constant,
         load=lambda node: f"x[{start[node.argument] + offsets[node.argument][node.element]}]",
-        words={"f": suffix, "one": f"1.0{suffix}", "zero": f"0.0{suffix}"},
+        words={"one": c_constant(1.0), "zero": c_constant(0.0)},
     )
 
 
-def _literal(value: float, real: Real) -> str:
-    """A hexadecimal constant, which every compiler reads as the same bits."""
+def c_constant(value: float) -> str:
+    """Return a number of the type os_real_t in hexadecimal digits, which every compiler reads as the same bits."""
     if math.isnan(value):
-        return f"(({real})NAN)"
+        return "((os_real_t)NAN)"
     if math.isinf(value):
-        return f"({'-' if value < 0.0 else ''}({real})INFINITY)"
-    rounded = float(np.float32(value)) if real == "float" else value
-    mantissa, exponent = rounded.hex().split("p")
+        return f"((os_real_t){'-' if value < 0.0 else ''}INFINITY)"
+    mantissa, exponent = value.hex().split("p")
     digits = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
-    literal = f"{digits}p{exponent}{'f' if real == 'float' else ''}"
-    return f"({literal})" if literal.startswith("-") else literal
+    return f"((os_real_t){digits}p{exponent})"
 
 
 def _stores(program: Program, language: Language, dense: bool) -> list[str]:
@@ -133,30 +106,3 @@ def _stores(program: Program, language: Language, dense: bool) -> list[str]:
 
 def _listed(patterns: tuple[Pattern, ...], dense: bool) -> str:
     return ", ".join(f"{pattern.name} ({pattern.length(dense)})" for pattern in patterns) or "nothing"
-
-
-def _check_constants(program: Program) -> None:
-    for index, node in enumerate(program.nodes):
-        if not isinstance(node, Constant) or not math.isfinite(node.value) or node.value == 0.0:
-            continue
-        with np.errstate(over="ignore", under="ignore"):
-            rounded = abs(float(np.float32(node.value)))
-        if math.isinf(rounded) or rounded < SMALLEST_NORMAL_FLOAT:
-            fault = "overflows" if math.isinf(rounded) else "underflows"
-            raise InputError(
-                f"{program.name}: the constant {node.value!r} {fault} in float, in {_user(program, index)}. "
-                "Scale the model, or build it with a constant that float can hold."
-            )
-
-
-def _user(program: Program, constant: int) -> str:
-    for index, node in enumerate(program.nodes):
-        if isinstance(node, Operation) and constant in node.operands:
-            operands = (program.nodes[i] for i in node.operands)
-            spelt = ", ".join(
-                repr(operand.value) if isinstance(operand, Constant) else f"t{i}"
-                for i, operand in zip(node.operands, operands, strict=True)
-            )
-            return f"t{index} = {node.code}({spelt})"
-    output = next(k for k, result in enumerate(program.results) if constant in result)
-    return f"result `{program.outputs[output].name}`"

@@ -1,0 +1,30 @@
+"""Leaf: the kernel source of straight-line code."""
+
+from collections.abc import Sequence
+
+from optsat.errors import InputError
+from optsat.kernels.print_scalar import print_scalar
+from optsat.kernels.program import Program
+from optsat.kernels.source import KernelSource
+from optsat.port import Port
+
+
+def leaf_source(program: Program, inputs: Sequence[Port], outputs: Sequence[Port]) -> KernelSource:
+    """Return the kernel of a folded program, its arguments and results described by ports.
+
+    Raises
+    ------
+    InputError : the shape of a port differs from the program's.
+    """
+    for kind, ports, patterns in (("input", inputs, program.inputs), ("output", outputs, program.outputs)):
+        expected = [(pattern.rows, pattern.columns) for pattern in patterns]
+        if (got := [(port.rows, port.columns) for port in ports]) != expected:
+            raise InputError(f"{program.name}: the {kind} ports have shapes {got}, the program has {expected}.")
+    return KernelSource(
+        name=program.name,
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
+        body=print_scalar(program, dense=True),
+        libm=program.libm,
+        operations=program.operation_count,
+    )

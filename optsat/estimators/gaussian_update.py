@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import reduce
 
 from optsat.attitude.backend import Value
 from optsat.estimators.filter_model import FilterModel, Noise, noise_matrix, noise_port, symmetric
@@ -88,18 +89,18 @@ def cholesky(M: Value, rounding: float) -> Factor:
 
     n = M.shape[0]
     L = ca.SX.zeros(n, n)
-    pivots, inverses, definite = [], [], ca.SX(1)
+    pivots, inverses, positives = [], [], []
     for j in range(n):
         pivot = M[j, j] - ca.sumsqr(L[j, :j]) if j else M[j, j]
         positive = pivot > _LEAST_PIVOT * rounding * M[j, j]
-        definite = ca.logic_and(definite, positive)
+        positives.append(positive)
         pivots.append(ca.if_else(positive, pivot, 1))
         L[j, j] = ca.sqrt(pivots[j])
         inverses.append(1 / L[j, j])
         for i in range(j + 1, n):
             rest = M[i, j] - ca.dot(L[i, :j], L[j, :j]) if j else M[i, j]
             L[i, j] = rest * inverses[j]
-    return Factor(ca.tril(L), tuple(pivots), tuple(inverses), definite)
+    return Factor(ca.tril(L), tuple(pivots), tuple(inverses), reduce(ca.logic_and, positives))
 
 
 def log_likelihood(factor: Factor, whitened: Value) -> Value:

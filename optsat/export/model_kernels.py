@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from optsat.arrays import Array
 from optsat.models.epoch import Epoch
 from optsat.models.magnetic_field import TiltedDipole
 from optsat.models.rigid_body import EXAMPLE_INERTIA, RigidBody
@@ -12,7 +13,9 @@ EXAMPLE_EPOCH = "2021-03-20T12:00:00Z"
 """Epoch of the example scenario, which the kernels count t from unless told otherwise."""
 
 
-def rigid_body_step(inertia_B: Sequence[Sequence[float]] = EXAMPLE_INERTIA, substeps: int = 1) -> GeneratedFunction:
+def rigid_body_step(
+    inertia_B: Array | Sequence[Sequence[float]] = EXAMPLE_INERTIA, substeps: int = 1
+) -> GeneratedFunction:
     """Return `rigid_body_step`: q_BN and omega_BN_B after dt under a torque held in B.
 
     inertia_B : inertia matrix (3, 3) about the centre of mass [kg m^2]

@@ -1,6 +1,7 @@
 """Toolchain: find the C compiler and run it so that it keeps the bits."""
 
 import os
+import platform
 import shlex
 import shutil
 import signal
@@ -15,9 +16,13 @@ from optsat.kernels.codes import LIBM
 CANDIDATES = ("cc", "gcc", "clang")
 
 # a compiler that knows a function evaluates it on constants in its own way, up to one unit in the last place off
+# on x86, gcc 12 joins products into alternating sums and differences (vfmaddsub) even with -ffp-contract=off
+_NO_FUSED_PRODUCTS = ("-mno-fma",) if platform.machine().lower() in ("x86_64", "amd64", "i386", "i686") else ()
+
 KEEP_BITS = (
     "-std=c99",
     "-ffp-contract=off",
+    *_NO_FUSED_PRODUCTS,
     *(f"-fno-builtin-{name}{suffix}" for name in sorted(set(LIBM.values())) for suffix in ("", "f")),
 )
 """Flags that every kernel is compiled with, after all others."""

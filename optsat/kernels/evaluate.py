@@ -27,8 +27,9 @@ def _erf(a: Any) -> Any:
 def _remainder(a: Any, b: Any) -> Any:
     size = np.abs(b)
     rest = np.fmod(np.abs(a), 2.0 * size)
-    rest = rest - size if 2.0 * rest > size else rest
-    rest = rest - size if 2.0 * rest >= size else rest
+    if rest > size - rest:
+        rest = rest - size
+        rest = rest - size if rest >= size - rest else rest
     return -rest if np.signbit(a) else rest
 
 

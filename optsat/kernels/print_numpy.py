@@ -58,8 +58,9 @@ def ieee_remainder(a, b):
     """Return a - n b with n the integer nearest to a / b, the even one at a tie: the remainder of C, exact."""
     size = np.abs(b)
     rest = np.fmod(np.abs(a), 2.0 * size)
-    rest = np.where(2.0 * rest > size, rest - size, rest)
-    rest = np.where(2.0 * rest >= size, rest - size, rest)
+    less = rest - size
+    less = np.where(less >= size - less, less - size, less)
+    rest = np.where(rest > size - rest, less, rest)
     return np.where(np.signbit(a), -rest, rest)
 
 '''

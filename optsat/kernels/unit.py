@@ -1,11 +1,10 @@
 """Unit: the whole C text of a library, one kernel behind the functions that it is called through."""
 
-import re
 from collections.abc import Sequence
-from importlib import resources
 from typing import Literal
 
 from optsat.kernels.float_constants import check_float_constants
+from optsat.kernels.headers import headers_text
 from optsat.kernels.source import KernelSource
 from optsat.port import Port
 
@@ -13,8 +12,6 @@ ABI = 1
 """Number of the functions that a library offers and of their arguments; a loader refuses any other."""
 
 Real = Literal["double", "float"]
-
-_INCLUDE = re.compile(r'^#include "(os_\w+\.h)"\n', re.MULTILINE)
 
 _SCALAR = """\
 static os_status_t {name}_sample(const os_real_t *x, os_real_t *y)
@@ -73,7 +70,7 @@ def library_text(source: KernelSource, real: Real = "double") -> str:
     return "\n".join(
         [
             *(["#define OS_REAL_IS_FLOAT", ""] if real == "float" else []),
-            _headers(["os_rt.h"]),
+            headers_text(["os_rt.h"]),
             source.body,
             f"extern const uint32_t os_abi;\nextern const uint32_t os_width;\nconst uint32_t os_abi = {ABI}U;",
             "const uint32_t os_width = 1U;\n",
@@ -112,18 +109,3 @@ def _copies(ports: Sequence[Port], statement: str) -> list[str]:
 
 def _indented(lines: Sequence[str], levels: int) -> str:
     return "\n".join(f"{'    ' * levels}{line}" for line in lines)
-
-
-def _headers(names: Sequence[str]) -> str:
-    texts: dict[str, str] = {}
-
-    def take(name: str) -> None:
-        if name not in texts:
-            text = resources.files("optsat.kernels.c").joinpath(name).read_text(encoding="utf-8")
-            for other in _INCLUDE.findall(text):
-                take(other)
-            texts[name] = _INCLUDE.sub("", text)
-
-    for name in names:
-        take(name)
-    return "\n".join(texts.values())

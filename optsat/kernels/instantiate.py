@@ -6,10 +6,8 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import TypeAlias
 
-import numpy as np
-
 from optsat.errors import InputError
-from optsat.kernels.print_scalar import print_scalar
+from optsat.kernels.print_scalar import c_constant, print_scalar
 from optsat.kernels.program import Program, starts
 from optsat.kernels.source import KernelSource, Twin
 from optsat.port import Port
@@ -21,7 +19,6 @@ _SLOT = re.compile(r"^/\*@(leaf|step) (\w+): ([\w +*]+) -> ([\w +*]+) \*/$", re.
 _INCLUDE = re.compile(r"^/\*@include (\w+)\*/$", re.MULTILINE)
 _SIZES = "/*@sizes*/"
 _TABLES = "/*@tables*/"
-_FLOAT_RANGE = (float(np.finfo(np.float32).tiny), float(np.finfo(np.float32).max))
 
 _WRAPPED = """\
 typedef struct {{
@@ -63,8 +60,7 @@ def instantiate(
 
     Raises
     ------
-    InputError : a slot, size or constant is missing or unknown, a leaf does not fit its slot, or a constant is
-        beyond what float can hold.
+    InputError : a slot, size or constant is missing or unknown, or a leaf does not fit its slot.
     """
     constants, tables = constants or {}, tables or {}
     if re.match(r"os(_|$)", name):
@@ -83,7 +79,7 @@ def instantiate(
     text = text.replace(_SIZES, f"enum {{ {listed} }};")
     text = text.replace(_TABLES, "\n".join(_table(f"KERNEL_{key}", values) for key, values in tables.items()))
     for key, value in constants.items():
-        text = re.sub(rf"\bKERNEL_{key}\b", _literal(f"{template}, constant {key}", value), text)
+        text = re.sub(rf"\bKERNEL_{key}\b", c_constant(float(value)), text)
     text = _SLOT.sub(lambda found: _filled(template, found, leaves[found[2]], sizes), text)
     return KernelSource(
         name=name,
@@ -150,14 +146,5 @@ def _table(name: str, values: Sequence[int] | Sequence[float]) -> str:
     if all(isinstance(value, int) for value in values):
         listed, kind = [str(value) for value in values], "int32_t"
     else:
-        listed, kind = [_literal(name, float(value)) for value in values], "os_real_t"
+        listed, kind = [c_constant(float(value)) for value in values], "os_real_t"
     return f"static const {kind} {name}[{len(listed)}] = {{ {', '.join(listed)} }};"
-
-
-def _literal(where: str, value: float) -> str:
-    low, high = _FLOAT_RANGE
-    if value != 0.0 and not low <= abs(value) <= high:
-        raise InputError(f"Template {where}: {value!r} is beyond what float can hold. Scale the model.")
-    mantissa, exponent = value.hex().split("p")
-    digits = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
-    return f"((os_real_t){digits}p{exponent})"

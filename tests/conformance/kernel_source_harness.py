@@ -75,6 +75,7 @@ def compile_text(text: str, path: Path, compiler: str, flags: Sequence[str]) -> 
 def compiled(source: KernelSource, folder: Path, compiler: str = "gcc", level: str = "-O2", real: Any = float) -> Call:
     """The kernel as a function of x, strict warnings being errors."""
     single = real is np.float32
+    folder.mkdir(exist_ok=True)
     path = folder / f"{source.name}_{compiler}{level}{'_float' if single else ''}.so"
     flags = [level, "-fPIC", "-shared", *(["-DOS_REAL_IS_FLOAT"] if single else [])]
     compile_text(unit_text(source), path, compiler, flags)

@@ -56,7 +56,9 @@ def _solve(columns: Array, given: Array, tolerance: float, m: int, cycles: int) 
 
 
 def _cycle(columns: Array, rest: Array, length: float, enough: float, m: int) -> tuple[list[Array], int]:
-    basis, triangle, rotations, reduced = [rest / length], [], [], [length]
+    basis, reduced = [rest / length], [length]
+    triangle: list[list[float]] = []
+    rotations: list[tuple[float, float]] = []
     for _ in range(m):
         fresh = _multiply(columns, basis[-1])
         before = np.sqrt(dot(fresh, fresh))

@@ -27,6 +27,7 @@ class Port:
     positive_definite : a covariance: symmetric, diagonal positive, no entry larger than its diagonal allows
     direction : rows of any length but zero, which flight code scales to length 1; it counts those whose length differed
         from 1 by more than this number
+    verdict : a result that is 1 where the others can be trusted; where it is not, flight code refuses them
     counted : how many of the rows hold data is told at run time; the others repeat row 0, or hold `padding`
     safe : what a result holds when a check failed, one number or one for each entry; unless given the identity
         quaternion, matrix or first axis where `unit_norm`, the identity where `positive_definite`, else 0 within range
@@ -45,6 +46,7 @@ class Port:
     upper: float | None = None
     positive_definite: bool = False
     direction: float | None = None
+    verdict: bool = False
     counted: bool = False
     padding: float | None = None
     safe: float | tuple[float, ...] | None = None

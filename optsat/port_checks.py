@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from optsat.port import Port
 
+ASYMMETRY = 2.0**-26
+"""Difference of two entries that a covariance may have by rounding, as a part of the mean of their diagonal entries."""
+
 
 def fault_of_checks(port: "Port") -> str:
     """Return what is wrong with the checks of a port, or "" where nothing is."""
@@ -23,6 +26,8 @@ def fault_of_checks(port: "Port") -> str:
         return "limits and padding must be finite; leave out the limit that is none"
     if port.positive_definite and not square:
         return "only a square matrix can be positive definite"
+    if port.verdict and port.shape:
+        return "a verdict is one number, 1 or 0"
     if port.counted and not port.shape:
         return "a scalar has no rows to count"
     if port.padding is not None and not port.counted:
@@ -72,9 +77,12 @@ def is_accepted(port: "Port", values: tuple[float, ...]) -> bool:
     if port.positive_definite:
         n = port.shape[0]
         diagonal = [values[k * (n + 1)] for k in range(n)]
-        return min(diagonal) > 0.0 and all(
-            values[i * n + j] == values[j * n + i] and 2.0 * abs(values[i * n + j]) <= diagonal[i] + diagonal[j]
-            for i in range(n)
-            for j in range(i)
-        )
+        if min(diagonal) <= 0.0:
+            return False
+        for i in range(n):
+            for j in range(i):
+                mean = diagonal[i] / 2 + diagonal[j] / 2
+                below, above = values[i * n + j], values[j * n + i]
+                if abs(below - above) > ASYMMETRY * mean or abs(below) > mean * (1.0 + ASYMMETRY):
+                    return False
     return True

@@ -78,7 +78,7 @@ def wahba_quartic(vectors: int = 4, tiny: float = 1e-300, rounding: float = 2.0*
             (QUATERNION, q),
             (Port("eigenvalue", (), "-", lower=0.0), eigenvalue),
             (Port("gap", (), "-", lower=0.0), gap),
-            (Port("determined", (), "-", lower=0.0, upper=1.0), determined),
+            (Port("determined", (), "-", lower=0.0, upper=1.0, verdict=True), determined),
         ],
     )
 

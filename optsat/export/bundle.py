@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 
+from optsat.errors import InputError
 from optsat.export.build_files import cmake_lists, makefile
-from optsat.export.c_text import comment
 from optsat.export.definition import Definition
-from optsat.export.float_constants import lost_in_float
 from optsat.export.interface import Interface
 from optsat.export.print_header import print_header
 from optsat.export.print_selftest import allowed_difference, print_main, print_selftest
@@ -17,6 +16,7 @@ from optsat.export.print_source import print_source
 from optsat.export.provenance import Measured, provenance
 from optsat.export.target import Precision, Target
 from optsat.export.vectors import Vector, draw_vectors
+from optsat.kernels.float_constants import check_float_constants
 
 OWN = ("os_guard.h", "os_adapt.h", "os_selftest.h")
 """Files of `optsat/export/c` that every export holds."""
@@ -46,7 +46,11 @@ class Bundle:
     @cached_property
     def vectors(self) -> tuple[list[Vector], ...]:
         """The stored arguments and answers of each kernel."""
-        return tuple(map(draw_vectors, self.definitions, self.interfaces))
+        limits = self.precision == "double"
+        return tuple(
+            draw_vectors(definition, interface, limits)
+            for definition, interface in zip(self.definitions, self.interfaces, strict=True)
+        )
 
     def texts(self, measured: Mapping[str, Measured]) -> dict[str, str]:
         """Return the text of every file by its name, with what was measured of each kernel, if anything."""
@@ -60,7 +64,7 @@ class Bundle:
             head = provenance(definition, interface, self.target, self.precision, measured.get(name, Measured()))
             source = print_source(interface, head)
             found[f"{name}.h"] = print_header(interface, head)
-            found[f"{name}.c"] = _refusing_float(source)
+            found[f"{name}.c"] = _refusing_float(name, source)
             found[f"{name}_selftest.c"] = print_selftest(interface, vectors, self.precision)
         return found | self._runtime(found)
 
@@ -81,15 +85,15 @@ def _own(file: str) -> str:
     return resources.files("optsat.export").joinpath("c", *file.split("/")).read_text(encoding="utf-8")
 
 
-def _refusing_float(source: str) -> str:
+def _refusing_float(name: str, source: str) -> str:
     # a constant that became 0 would take a guard with it without a word
-    fault = lost_in_float(source)
-    if not fault:
-        return source
-    refusal = f'#ifdef OS_REAL_IS_FLOAT\n#error "{_quoted(fault)}"\n#endif'
-    first = source.index('#include "os_guard.h"')
-    says = comment(["Not for float."])
-    return f"{source[:first]}{says}\n{refusal}\n\n{source[first:]}"
+    try:
+        check_float_constants(name, source)
+    except InputError as error:
+        refusal = f'#ifdef OS_REAL_IS_FLOAT\n#error "{_quoted(str(error))}"\n#endif'
+        first = source.index('#include "os_guard.h"')
+        return f"{source[:first]}{refusal}\n\n{source[first:]}"
+    return source
 
 
 def _quoted(text: str) -> str:

@@ -40,7 +40,7 @@ def indented(lines: Iterable[str], levels: int = 1) -> list[str]:
 def loop(count: int, body: str) -> list[str]:
     """Return `body` for k from 0 to count - 1, as a loop, or as one line where count is 1."""
     if count == 1:
-        return [body.replace("[k]", "[0]").replace("U + k]", "U]")]
+        return [body.replace("[k]", "[0U]").replace("U + k]", "U]")]
     return [f"for (uint32_t k = 0U; k < {count}U; k++) {{", f"    {body}", "}"]
 
 

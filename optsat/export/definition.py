@@ -11,8 +11,8 @@ import numpy as np
 
 from optsat.arrays import Array
 from optsat.errors import InputError
+from optsat.kernels.leaf import leaf_source
 from optsat.kernels.lowering import lower
-from optsat.kernels.print_scalar import print_scalar
 from optsat.kernels.program import Operation
 from optsat.kernels.source import KernelSource, Twin
 from optsat.port import Port
@@ -67,14 +67,7 @@ def sha256(text: str) -> str:
 def _of_function(function: GeneratedFunction, parameters: Mapping[str, Any]) -> Definition:
     names = [[port.name for port in ports] for ports in (function.inputs, function.outputs)]
     program = lower(function.casadi, names_in=names[0], names_out=names[1])
-    source = KernelSource(
-        name=function.name,
-        inputs=function.inputs,
-        outputs=function.outputs,
-        body=print_scalar(program, dense=True),
-        libm=program.libm,
-        operations=program.operation_count,
-    )
+    source = leaf_source(program, function.inputs, function.outputs)
     counts = Counter(node.code for node in program.nodes if isinstance(node, Operation))
     return Definition(
         source,

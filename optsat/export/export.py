@@ -10,7 +10,6 @@ from optsat.errors import InputError, explain_unknown_options, nearest_name
 from optsat.export.bundle import Bundle
 from optsat.export.catalogue import Kernel, build
 from optsat.export.definition import Definition, define
-from optsat.export.float_constants import check_float
 from optsat.export.interface import Interface
 from optsat.export.object_file import ObjectFile
 from optsat.export.print_readme import print_readme
@@ -18,6 +17,7 @@ from optsat.export.provenance import Measured
 from optsat.export.target import TARGETS, Precision, Target
 from optsat.export.verify import Replay, Verification, check_answers, verify
 from optsat.files import write_atomically
+from optsat.kernels.float_constants import check_float_constants
 
 _PRECISIONS: Mapping[str, Precision] = {"float": "float", "double": "double"}
 
@@ -130,7 +130,7 @@ def gather(
                 raise InputError(f"`{option}` names {name}, which is not exported.{nearest_name(name, names)}")
     if real == "float":
         for definition in definitions:
-            check_float(definition.source.name, definition.source.body)
+            check_float_constants(definition.source.name, definition.source.body)
     interfaces = [Interface(d.source, tuple(keep_last.get(d.source.name, ()))) for d in definitions]
     return Bundle(tuple(definitions), tuple(interfaces), TARGETS[target], real)
 

@@ -53,6 +53,8 @@ def conditions(port: Port) -> str:
         parts.append(f"<= {port.upper:g}")
     if port.positive_definite:
         parts.append("symmetric with positive diagonal")
+    if port.verdict:
+        parts.append("1 where the results can be trusted, else the call is refused")
     if port.counted:
         parts.append("the first `count` rows are read")
     return ", ".join(parts)

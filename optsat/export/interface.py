@@ -76,6 +76,11 @@ class Interface:
         return any(port.direction is not None for port in self.source.inputs)
 
     @property
+    def verdicts(self) -> tuple[Port, ...]:
+        """Results that are 1 where the others can be trusted."""
+        return tuple(port for port in self.source.outputs if port.verdict)
+
+    @property
     def has_work(self) -> bool:
         """Whether the caller gives working memory: a template's, not a leaf's."""
         return self.source.has_status

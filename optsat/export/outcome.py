@@ -11,8 +11,11 @@ from optsat.export.interface import Interface
 from optsat.port import Port
 from optsat.port_checks import is_accepted
 
-OK, NOT_FINITE, NOT_UNIT, RANGE, OUTPUT, STATE = 0, 2, 3, 4, 5, 7
+OK, NOT_FINITE, NOT_UNIT, RANGE, OUTPUT, NOT_CONVERGED, STATE = 0, 2, 3, 4, 5, 6, 7
 """Values of os_status_t."""
+
+TRUSTED = 0.5
+"""What a verdict must reach; it is 1 or 0."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ def outcome(definition: Definition, interface: Interface, x: Array, count: int) 
     status = _refusal([each for each in arguments if each[0] in interface.arguments], not rows or 1 <= count <= rows)
     if status == OK:
         status, y = definition.reference(given)
+        if status == OK and any(y[interface.first_out[port.name]] < TRUSTED for port in interface.verdicts):
+            status = NOT_CONVERGED
         if status == OK and all(is_accepted(port, values) for port, values in _split(source.outputs, y)):
             return Outcome(OK, OK, y, scaled)
         status = status or OUTPUT

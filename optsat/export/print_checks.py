@@ -1,5 +1,6 @@
 """Checks in C: the statements that count what is wrong with the values of a port."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,6 +8,8 @@ from optsat.export.c_text import real
 from optsat.port import Port
 
 LIMIT = "OS_LARGEST"
+
+_IN_ROW = re.compile(r"(&[\w>-]+\[)(\d+)U\]")
 
 
 @dataclass(frozen=True)
@@ -16,10 +19,25 @@ class Place:
     port: Port
     pointer: str
 
+    @property
+    def end(self) -> str:
+        """Where the next port begins, or "" where nobody can tell."""
+        found = _IN_ROW.fullmatch(self.pointer)
+        return f"{found[1]}{int(found[2]) + self.port.size}U]" if found else ""
+
 
 def count_not_finite(places: Sequence[Place]) -> list[str]:
-    """Return terms that count entries that are NaN or infinite."""
-    return [f"os_not_finite({place.pointer}, {place.port.size}U)" for place in places]
+    """Return terms that count entries that are NaN or infinite, one for ports that stand one behind another."""
+    runs: list[tuple[str, int]] = []
+    end = ""
+    for place in places:
+        if place.pointer == end:
+            pointer, size = runs.pop()
+            runs.append((pointer, size + place.port.size))
+        else:
+            runs.append((place.pointer, place.port.size))
+        end = place.end
+    return [f"os_not_finite({pointer}, {size}U)" for pointer, size in runs]
 
 
 def count_not_unit(places: Sequence[Place]) -> list[str]:

@@ -40,6 +40,6 @@ def _kernel(kernel: "ExportedKernel") -> str:
         lines += [
             f"- {said.vectors} stored vectors on {said.where}, {said.accepted} of them accepted: {said.differing} of "
             f"{said.numbers} numbers differ from Python, the largest difference {said.worst_ulp:.3g} units in the last "
-            "place of the result's largest entry"
+            "place of the result's largest number"
         ]
     return "\n".join(lines)

@@ -4,6 +4,7 @@ import re
 
 from optsat.export.c_text import call, chained, comment, copied, indented, loop, real
 from optsat.export.interface import Interface
+from optsat.export.outcome import TRUSTED
 from optsat.export.print_checks import (
     Place,
     count_all,
@@ -142,7 +143,7 @@ def _written_safe(structure: str, port: Port) -> list[str]:
         diagonal = _entry(structure, port).replace("[k]", f"[k * {n + 1}U]")
         zero = loop(port.size, f"{_entry(structure, port)} = {real(0.0)};")
         return [*zero, *loop(n, f"{diagonal} = {real(1.0)};")]
-    return [_entry(structure, port).replace("[k]", f"[{k}]") + f" = {real(v)};" for k, v in enumerate(values)]
+    return [_entry(structure, port).replace("[k]", f"[{k}U]") + f" = {real(v)};" for k, v in enumerate(values)]
 
 
 def _guarded(interface: Interface) -> list[str]:
@@ -154,7 +155,7 @@ def _guarded(interface: Interface) -> list[str]:
     lines += _loads(interface, x)
     places = [Place(port, _checked_where(interface, port, x)) for port in interface.arguments]
     lines += _counters(places, interface)
-    results = [Place(port, f"&{y}[{interface.first_out[port.name]}]") for port in source.outputs]
+    results = [Place(port, f"&{y}[{interface.first_out[port.name]}U]") for port in source.outputs]
     if source.has_status:
         lines += [f"const os_status_t found = {name}_body({x}, {y}, &memory->work);"]
     else:
@@ -163,6 +164,8 @@ def _guarded(interface: Interface) -> list[str]:
     verdicts = [("!valid", "status = OS_E_STATE;")] if interface.state else []
     verdicts += _verdicts(places, interface)
     verdicts += [("found != OS_OK", "status = found;")] if source.has_status else []
+    distrusted = [f"!({y}[{interface.first_out[p.name]}U] >= {real(TRUSTED)})" for p in interface.verdicts]
+    verdicts += [(" || ".join(distrusted), "status = OS_E_NOT_CONVERGED;")] if distrusted else []
     verdicts += [("bad_output != 0U", "status = OS_E_OUTPUT;")] if results else []
     lines += chained(verdicts, "status = OS_OK;")
     lines += ["if (status == OS_OK) {"]
@@ -189,7 +192,7 @@ def _loads(interface: Interface, x: str) -> list[str]:
         if port.direction is not None:
             rows, length = port.size // port.row_length, port.row_length
             valid = "count" if port.counted else f"{rows}U"
-            arguments = (f"{rows}U", f"{length}U", valid, real(port.direction), f"&{x}[{first}]", "&scaled")
+            arguments = (f"{rows}U", f"{length}U", valid, real(port.direction), f"&{x}[{first}U]", "&scaled")
             scale = call("os_scale_rows", _member(structure, port), *arguments)
             lines += f"const uint32_t {_no_direction(port)} = {scale};".splitlines()
         elif port.counted:
@@ -198,21 +201,21 @@ def _loads(interface: Interface, x: str) -> list[str]:
             lines += copied(_at(x, first), _entry(structure, port), port.size)
         else:
             # one by one, so that a compiler sees that x needs no memory
-            entries = (_entry(structure, port).replace("[k]", f"[{k}]") for k in range(port.size))
-            lines += [f"{x}[{first + k}] = {entry};" for k, entry in enumerate(entries)]
+            entries = (_entry(structure, port).replace("[k]", f"[{k}U]") for k in range(port.size))
+            lines += [f"{x}[{first + k}U] = {entry};" for k, entry in enumerate(entries)]
     return lines
 
 
 def _counted_load(port: Port, first: int, x: str) -> list[str]:
     length = port.size // port.shape[0]
     entry = _entry("in", port)
-    row = f"k / {length}U" if length > 1 else "k"
+    row = f"(k / {length}U)" if length > 1 else "k"
     other = (
         real(port.padding)
         if port.padding is not None
-        else entry.replace("[k]", f"[k % {length}U]" if length > 1 else "[0]")
+        else entry.replace("[k]", f"[k % {length}U]" if length > 1 else "[0U]")
     )
-    return loop(port.size, f"{_at(x, first)} = (({row}) < count) ? {entry} : {other};")
+    return loop(port.size, f"{_at(x, first)} = ({row} < count) ? {entry} : {other};")
 
 
 def _counters(places: list[Place], interface: Interface | None = None) -> list[str]:
@@ -245,7 +248,7 @@ def _no_direction(port: Port) -> str:
 def _checked_where(interface: Interface, port: Port, x: str) -> str:
     # what is read by count or scaled is checked as the kernel gets it
     if port.counted or port.direction is not None:
-        return f"&{x}[{interface.first_in[port.name]}]"
+        return f"&{x}[{interface.first_in[port.name]}U]"
     return _member("in", port)
 
 

@@ -16,6 +16,12 @@ from optsat.port import Port
 GOOD = 32
 _NOISE = 0.01
 
+_FLOAT_ROUNDING = 2.0**-23
+_NUDGES = 2
+# answers may move by this many roundings of their arguments; beyond, they are no test of anything
+_STEADY = 256.0
+_TRIES = 3
+
 
 @dataclass(frozen=True)
 class Vector:
@@ -30,21 +36,43 @@ class Vector:
     expected: Outcome
 
 
-def draw_vectors(definition: Definition, interface: Interface, good: int = GOOD) -> list[Vector]:
-    """Return `good` vectors within the checks of the ports, and then one for each limit and each way to break a check.
+def draw_vectors(definition: Definition, interface: Interface, limits: bool, good: int = GOOD) -> list[Vector]:
+    """Return `good` vectors within the checks of the ports, and then one for each way to break a check.
 
-    The seed is made of the kernel's name: the same vectors everywhere.
+    limits : also those with an entry at a limit, where float may answer otherwise than double
+
+    Left out are arguments on which the answer hangs by a thread, such as an attitude from one direction: rounding them
+    to float would change it, and no comparison would tell anything. The seed is made of the kernel's name: the same
+    vectors everywhere.
     """
     seed = int.from_bytes(hashlib.sha256(definition.source.name.encode()).digest()[:8], "big")
     rng = np.random.default_rng(seed)
-    found = []
-    for _ in range(good):
-        x, count = draw(interface, rng)
-        found.append(Vector(x, count, outcome(definition, interface, x, count)))
-    x, count = draw(interface, rng)
-    for broken, broken_count in spoilt(interface, x, count):
-        found.append(Vector(broken, broken_count, outcome(definition, interface, broken, broken_count)))
-    return found
+    drawn = [draw(interface, rng) for _ in range(_TRIES * good)]
+    vectors = [Vector(x, count, outcome(definition, interface, x, count)) for x, count in drawn[:good]]
+    scale = np.max([np.abs(vector.expected.y) for vector in vectors], axis=0)
+    for port in interface.source.outputs:
+        part = slice(interface.first_out[port.name], interface.first_out[port.name] + port.size)
+        scale[part] = np.max(scale[part]) or 1.0
+
+    def is_stable(vector: Vector) -> bool:
+        if not np.all(np.isfinite(vector.x)):
+            return True
+        for _ in range(_NUDGES):
+            nudged = _nudged(interface, vector.x, rng)
+            found = outcome(definition, interface, nudged, vector.count)
+            same = (found.initial, found.status) == (vector.expected.initial, vector.expected.status)
+            if not same or np.any(np.abs(found.y - vector.expected.y) > _STEADY * _FLOAT_ROUNDING * scale):
+                return False
+        return True
+
+    found = [vector for vector in vectors if is_stable(vector)]
+    for x, count in drawn[good:]:
+        if len(found) < good:
+            vector = Vector(x, count, outcome(definition, interface, x, count))
+            found += [vector] if is_stable(vector) else []
+    x, count = (found[0].x, found[0].count) if found else drawn[0]
+    spoiled = [Vector(y, n, outcome(definition, interface, y, n)) for y, n in spoilt(interface, x, count, limits)]
+    return [*found, *(vector for vector in spoiled if is_stable(vector))]
 
 
 def draw(interface: Interface, rng: np.random.Generator) -> tuple[Array, int]:
@@ -64,8 +92,8 @@ def draw(interface: Interface, rng: np.random.Generator) -> tuple[Array, int]:
     return x.astype(np.float32).astype(np.float64), int(rng.integers(1, rows + 1)) if rows else 0
 
 
-def spoilt(interface: Interface, x: Array, count: int) -> Iterator[tuple[Array, int]]:
-    """Yield the arguments with one check after another broken, each alone, and those at the ends of a range."""
+def spoilt(interface: Interface, x: Array, count: int, limits: bool) -> Iterator[tuple[Array, int]]:
+    """Yield the arguments with one check after another broken, each alone, and those at the limits."""
     for port in interface.source.inputs:
         first = interface.first_in[port.name]
         entries = range(first, first + port.size)
@@ -75,7 +103,7 @@ def spoilt(interface: Interface, x: Array, count: int) -> Iterator[tuple[Array, 
         if port.direction is not None:
             changes += [dict.fromkeys(entries[: port.row_length], 0.0)]
         for limit in (port.lower, port.upper):
-            if limit is not None and not port.positive_definite and float(np.float32(limit)) == limit:
+            if limits and limit is not None and not port.positive_definite and float(np.float32(limit)) == limit:
                 changes += [{entries[-1]: limit}]
         if port.lower is not None:
             changes += [{entries[0]: port.lower - 1.0 - abs(port.lower)}]
@@ -92,6 +120,16 @@ def spoilt(interface: Interface, x: Array, count: int) -> Iterator[tuple[Array, 
     if interface.counted:
         yield x, 0
         yield x, interface.counted[0].shape[0] + 1
+
+
+def _nudged(interface: Interface, x: Array, rng: np.random.Generator) -> Array:
+    nudged = x * (1.0 + _FLOAT_ROUNDING * rng.uniform(-1.0, 1.0, len(x)))
+    for port in interface.source.inputs:
+        if port.positive_definite:
+            part = slice(interface.first_in[port.name], interface.first_in[port.name] + port.size)
+            matrix = nudged[part].reshape(port.shape)
+            nudged[part] = np.ravel((matrix + matrix.T) / 2)
+    return np.asarray(nudged)
 
 
 def _drawn(port: Port, rng: np.random.Generator) -> Array:

@@ -23,7 +23,7 @@ class Replay:
     """What one self-test said of a kernel.
 
     accepted : vectors with OS_OK; worst_ulp : largest difference from Python, in units in the last place of the
-    largest entry of its result; error : the same as a number; bits : digest of all results
+    largest number of its result; error : the same as a number; bits : digest of all results
     """
 
     where: str
@@ -79,7 +79,7 @@ def verify(bundle: Bundle, folder: Path) -> Verification:
 def check_answers(found: Verification, allowed: Mapping[str, float]) -> None:
     """Raise where a kernel answered otherwise than stored.
 
-    allowed : largest difference by kernel, in units in the last place of the largest entry of a result
+    allowed : largest difference by kernel, in units in the last place of the largest number of a result
 
     Raises
     ------

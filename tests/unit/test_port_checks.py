@@ -18,6 +18,7 @@ from optsat.port_checks import is_accepted
         ({"lower": 1.0, "upper": 1.0}, (), "must be below"),
         ({"upper": float("inf")}, (), "finite"),
         ({"positive_definite": True}, (2, 3), "square"),
+        ({"verdict": True}, (2,), "one number"),
         ({"counted": True}, (), "no rows"),
         ({"padding": 0.0}, (3,), "counted=True"),
         ({"safe": (0.0, 1.0)}, (3,), "3 numbers or one, got 2"),

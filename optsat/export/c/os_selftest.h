@@ -9,16 +9,14 @@
 
 #ifdef OS_REAL_IS_FLOAT
 #define OS_SPACING ((double)FLT_EPSILON)
-#define OS_LEAST_NORMAL ((double)FLT_MIN)
 typedef uint32_t os_bits_t;
 #else
 #define OS_SPACING DBL_EPSILON
-#define OS_LEAST_NORMAL DBL_MIN
 typedef uint64_t os_bits_t;
 #endif
 
-/* worst: largest difference of a result in units in the last place of the largest entry of its port; error: the same as
- * a number; bits: a digest of all results, the same on every computer that gives the same bits. */
+/* worst: largest difference of a result in units in the last place of the largest number that it has in any vector;
+ * error: the same as a number; bits: a digest of all results, the same on every computer that gives the same bits. */
 typedef struct {
     unsigned long vectors;
     unsigned long accepted;
@@ -43,12 +41,9 @@ static inline void os_tally_status(os_tally_t *tally, uint32_t got, uint32_t wan
     tally->wrong_status += (got == want) ? 0U : 1U;
 }
 
-static inline void os_tally_port(os_tally_t *tally, const os_real_t *got, const double *want, uint32_t count)
+static inline void os_tally_port(os_tally_t *tally, const os_real_t *got, const double *want, uint32_t count,
+                                 double largest)
 {
-    double largest = OS_LEAST_NORMAL;
-    for (uint32_t k = 0U; k < count; k++) {
-        largest = (fabs(want[k]) > largest) ? fabs(want[k]) : largest;
-    }
     for (uint32_t k = 0U; k < count; k++) {
         const os_real_t rounded = (os_real_t)want[k];
         const double difference = fabs((double)got[k] - want[k]);

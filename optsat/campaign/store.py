@@ -1,52 +1,80 @@
-"""Leave the result of a study in a folder, whole or not at all."""
+"""Store: the end of a run, written once all its chunks are on the disk, and read back with every digest checked.
+
+result.nc      every case, where the extra `results` is installed
+summary.csv    every case as text
+figure.svg     where the study draws one
+complete.json  last: digests of all these, the summary with its claims, failed cases
+"""
 
 import csv
+import hashlib
 import io
 import json
-import os
-import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
-from importlib import metadata
-from pathlib import Path
+from importlib.util import find_spec
 from typing import Any
 
-from optsat._version import __version__
+from optsat.campaign.final_file import write_final_file
 from optsat.campaign.result import StudyResult
-from optsat.campaign.threads import THREAD_VARIABLES
+from optsat.campaign.run_folder import COMPLETE, RunFolder
+from optsat.campaign.study import Study
+from optsat.campaign.table import Table
+from optsat.errors import OptsatError
 from optsat.files import write_atomically
 
+RESULT, SUMMARY, FIGURE = "result.nc", "summary.csv", "figure.svg"
 
-def write_result(result: StudyResult, folder: Path, command: Sequence[str]) -> None:
-    """Write `rows.csv` and then `result.json` into `folder`, which is made if absent.
 
-    rows.csv : case, failure (empty where the case ran), then the study's columns; numbers with all digits
-    result.json : the summary, the failed cases, and the provenance: versions, platform, threads, command
-    """
-    folder.mkdir(parents=True, exist_ok=True)
+def finish(study: Study, folder: RunFolder, result: StudyResult, tables: Callable[[], Iterator[Table]]) -> None:
+    """Write the final files of a run whose chunks are all there."""
+    written = [SUMMARY]
+    if find_spec("h5netcdf") is not None:
+        attributes = {"study": study.name, "version": study.version, "seed": result.seed}
+        write_final_file(folder.path / RESULT, tables, result.cases, attributes)
+        written.append(RESULT)
+    write_atomically(folder.path / SUMMARY, _rows_as_csv(result).encode())
+    if study.figure is not None and result.rows:
+        study.figure(result.rows, folder.path / FIGURE)
+        written.append(FIGURE)
     document = {
         **result.summary(),
         "failed_cases": [asdict(failure) for failure in result.failures],
-        "provenance": provenance(command),
+        "files": {name: _digest(folder, name) for name in sorted(written)},
     }
-    write_atomically(folder / "rows.csv", _rows_as_csv(result).encode())
-    write_atomically(folder / "result.json", (json.dumps(document, indent=2, allow_nan=False) + "\n").encode())
+    write_atomically(folder.path / COMPLETE, (json.dumps(document, indent=2, allow_nan=False) + "\n").encode())
+    folder.manifest.append("finished")
 
 
-def provenance(command: Sequence[str]) -> dict[str, Any]:
-    """Return what else a reader needs to run the same again."""
-    return {
-        "optsat": __version__,
-        "python": platform.python_version(),
-        **{name: metadata.version(name) for name in ("numpy", "scipy", "casadi")},
-        "platform": platform.platform(),
-        "threads": {name: os.environ.get(name) for name in THREAD_VARIABLES},
-        "command": list(command),
-    }
+def finished_result(study: Study, folder: RunFolder, result: StudyResult) -> StudyResult:
+    """Return the result of a complete run after checking the digests of its files.
+
+    Raises
+    ------
+    OptsatError : a file has changed or is gone.
+    """
+    document = json.loads((folder.path / COMPLETE).read_text(encoding="utf-8"))
+    for name, digest in document["files"].items():
+        if not (folder.path / name).exists() or _digest(folder, name) != digest:
+            raise OptsatError(
+                f"{folder.path / name} is not the file that the run of {study.name} wrote. Delete {COMPLETE} there and "
+                "run again with --resume to write it anew from the chunks."
+            )
+    return result
+
+
+def _digest(folder: RunFolder, name: str) -> dict[str, Any]:
+    sha256, size = hashlib.sha256(), 0
+    with (folder.path / name).open("rb") as stream:
+        while block := stream.read(1 << 20):
+            sha256.update(block)
+            size += len(block)
+    return {"bytes": size, "sha256": sha256.hexdigest()}
 
 
 def _rows_as_csv(result: StudyResult) -> str:
-    columns = [name for name in (result.rows[0] if result.rows else ()) if name != "case"]
+    first = result.rows[0] if result.rows else {}
+    columns = [name for name, value in first.items() if name != "case" and not hasattr(value, "shape")]
     lines: dict[Any, list[Any]] = {
         row["case"]: [row["case"], "", *(row[name] for name in columns)] for row in result.rows
     }

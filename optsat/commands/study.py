@@ -37,27 +37,19 @@ def run_command(
     workers: Annotated[int, typer.Option(min=1, help="Worker processes; the rows are the same for any number.")] = 1,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder for result.json, rows.csv and the figure.", show_default=False),
+        typer.Option(metavar="DIR", help="Folder that keeps every finished chunk and the result.", show_default=False),
     ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the unfinished run in --out.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a study and judge its claims. Exit code 1 when a case failed or a bar of our own fails."""
-    import sys
-
     from optsat.campaign.catalogue import load_study
     from optsat.campaign.runner import run_study
-    from optsat.campaign.store import write_result
 
     study = load_study(name)
-    if out is not None:
-        # a folder that cannot be made must be known before the first case, not after the last
-        out.mkdir(parents=True, exist_ok=True)
     with progress_bar(study.name) as report:
-        result = run_study(study, cases, seed, workers, report)
+        result = run_study(study, cases, seed, workers, report, out, resume)
     if out is not None:
-        write_result(result, out, sys.argv)
-        if study.figure is not None and result.rows:
-            study.figure(result.rows, out / "figure.svg")
         note(f"Written to {out}.")
     if as_json:
         print_json(result.summary())

@@ -144,8 +144,8 @@ def test_study_run_stores_result_rows_and_figure(tmp_path: Path) -> None:
     result = invoke("study", "run", "toy-study", "--workers", "2", "--out", str(folder), "--json")
     assert result.exit_code == 0
     assert str(folder) in result.stderr
-    assert sorted(path.name for path in folder.iterdir()) == ["figure.svg", "result.json", "rows.csv"]
-    printed, stored = json.loads(result.stdout), json.loads((folder / "result.json").read_text())
+    assert {path.name for path in folder.iterdir()} >= {"complete.json", "figure.svg", "run.json", "summary.csv"}
+    printed, stored = json.loads(result.stdout), json.loads((folder / "complete.json").read_text())
     assert printed == {name: stored[name] for name in printed}
 
 

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 import toy_study
 
-from optsat.campaign import runner
 from optsat.campaign.claim import Claim, Verdict, judge_bar
 from optsat.campaign.runner import run_study
 from optsat.campaign.seeds import campaign_key, case_generator
 from optsat.campaign.study import Case, Study
 from optsat.campaign.threads import THREAD_VARIABLES, one_thread_each
-from optsat.errors import InputError, OptsatError
+from optsat.errors import InputError
 
 
 def test_rows_hold_the_draws_of_their_place() -> None:
@@ -78,9 +77,13 @@ def test_a_design_of_the_wrong_length_is_refused() -> None:
         run_study(_variant(cases=lambda _count: [{}]), cases=2)
 
 
-def test_rows_hold_scalars_only() -> None:
-    with pytest.raises(InputError, match="case 0 returned `q_BN` of type ndarray"):
-        run_study(_variant(run=lambda _case, _rng: {"q_BN": np.zeros(4)}))
+def test_rows_hold_scalars_and_arrays_of_numbers_only() -> None:
+    with pytest.raises(InputError, match="case 0 returned `q_BN` of type list"):
+        run_study(_variant(run=lambda _case, _rng: {"q_BN": [0.0] * 4}))
+    with pytest.raises(InputError, match="case 0 returned `names` of type ndarray"):
+        run_study(_variant(run=lambda _case, _rng: {"names": np.array(["a"])}))
+    with pytest.raises(InputError, match="`q_BN` must have one shape in all cases"):
+        run_study(_variant(run=lambda case, _rng: {"q_BN": np.zeros(1 + int(case["offset"]))}), cases=2, workers=1)
 
 
 def test_columns_must_agree() -> None:
@@ -138,13 +141,3 @@ def test_workers_get_one_thread_and_the_caller_keeps_his(monkeypatch: pytest.Mon
         assert {os.environ[name] for name in THREAD_VARIABLES} == {"1"}
     assert os.environ[first] == "7"
     assert second not in os.environ
-
-
-def _die(*_arguments: object) -> None:
-    os._exit(9)
-
-
-def test_a_dead_worker_is_said_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "_ignore_interrupt", _die)
-    with pytest.raises(OptsatError, match="a worker process of study toy-study died"):
-        run_study(toy_study.study, workers=2)

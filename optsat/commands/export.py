@@ -38,6 +38,7 @@ def export_command(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    misra: Annotated[bool, typer.Option("--misra", help="Check large kernels against MISRA too, for minutes.")] = False,
     listed: Annotated[bool, typer.Option("--list", help="List the kernels and their parameters.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -54,7 +55,14 @@ def export_command(
     names = kernels or []
     try:
         export = export_c(
-            names, out, target, precision, _parameters(parameter or [], names), _kept(keep_last or [], names), force
+            names,
+            out,
+            target,
+            precision,
+            _parameters(parameter or [], names),
+            _kept(keep_last or [], names),
+            force,
+            misra,
         )
     except SelfTestError as error:
         note(f"optsat: {error}")

@@ -1,7 +1,8 @@
 """Export: kernels as a folder of freestanding C, written once it was compiled and answered as Python does."""
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from optsat.export.bundle import Bundle
 from optsat.export.catalogue import Kernel, build
 from optsat.export.definition import Definition, define
 from optsat.export.interface import Interface
+from optsat.export.misra import check, print_record
 from optsat.export.object_file import ObjectFile
 from optsat.export.print_readme import print_readme
 from optsat.export.provenance import Measured
@@ -57,6 +59,7 @@ def export_c(
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     keep_last: Mapping[str, Sequence[str]] | None = None,
     force: bool = False,
+    misra: bool = False,
 ) -> Export:
     """Write kernels as flight C with header, self-test, build files and provenance; compile and run them first.
 
@@ -64,7 +67,7 @@ def export_c(
     target : "desktop", "cortex-m4" or "cortex-m7"; precision : "float" or "double", by default that of its processor
     parameters : by name of the kernel, what its definition takes; keep_last : by name, results that hold their last
     good value after a failure
-    force : replace files that are there
+    force : replace files that are there; misra : also check kernels against MISRA that take minutes
 
     Raises
     ------
@@ -75,13 +78,12 @@ def export_c(
     bundle = gather(kernels, target, precision, parameters or {}, keep_last or {})
     out = Path(folder)
     draft = bundle.texts({})
-    _check_free(out, [*draft, "README.md"], force)
-    with tempfile.TemporaryDirectory(prefix="optsat-export-") as temporary:
-        for name, text in draft.items():
-            (Path(temporary) / name).write_text(text, encoding="utf-8")
-        found = verify(bundle, Path(temporary))
+    _check_free(out, [*draft, "README.md", "DEVIATIONS.md"], force)
+    with _written(draft) as folder_of_draft:
+        found = verify(bundle, folder_of_draft)
     check_answers(found, bundle.allowed)
     texts = bundle.texts({name: _measured(name, found) for name in bundle.names})
+    texts["DEVIATIONS.md"], unchecked = _deviations(bundle, texts, misra)
     export = Export(
         folder=out,
         target=bundle.target,
@@ -92,13 +94,28 @@ def export_c(
             for d, i in zip(bundle.definitions, bundle.interfaces, strict=True)
         ),
         compiler=found.compiler,
-        unchecked=found.missing,
+        unchecked=(*found.missing, *unchecked),
     )
     texts["README.md"] = print_readme(export)
     out.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         write_atomically(out / name, text.encode())
     return export
+
+
+@contextmanager
+def _written(texts: Mapping[str, str]) -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="optsat-export-") as temporary:
+        for name, text in texts.items():
+            (Path(temporary) / name).write_text(text, encoding="utf-8")
+        yield Path(temporary)
+
+
+def _deviations(bundle: Bundle, texts: Mapping[str, str], large: bool) -> tuple[str, list[str]]:
+    # of the final texts, whose lines the record names
+    with _written(texts) as folder:
+        findings, unchecked = check(bundle, folder, large)
+    return print_record(findings, unchecked), unchecked
 
 
 def gather(

@@ -223,7 +223,7 @@ def _counters(places: list[Place], interface: Interface | None = None) -> list[s
     lines += counter("not_unit", _not_unit_terms(places))
     terms = count_out_of_range(places)
     if interface is not None and interface.counted:
-        terms = ["(has_count ? 0U : 1U)", *terms]
+        terms = ["os_failed(!has_count)", *terms]
     return [*lines, *counter("out_of_range", terms)]
 
 

@@ -62,7 +62,7 @@ MISTAKES = {
     "results are not looked at": ("rigid_body_step", ("bad_output != 0U", "(bad_output != 0U) && (not_finite != 0U)")),
     "a refusal leaves results stale": ("newton_root", ("if (out != NULL) {", "if ((out != NULL) && (in == NULL)) {")),
     "a range is not looked at": ("newton_root", ("out_of_range != 0U", "(out_of_range != 0U) && (not_finite != 0U)")),
-    "the count is not looked at": ("mean_direction", ("(has_count ? 0U : 1U)", "0U")),
+    "the count is not looked at": ("mean_direction", ("os_failed(!has_count)", "0U")),
     "a state never set is taken": ("covariance_step", ("if (!valid) {", "if ((!valid) && (in == NULL)) {")),
     "a NULL result is taken as told": ("quaternion_from_dcm", ("status = OS_E_NULL", "status = OS_OK")),
 }

@@ -13,6 +13,15 @@
 #define OS_ASYMMETRY ((os_real_t)0x1p-26)
 #endif
 
+static inline uint32_t os_failed(bool failed)
+{
+    uint32_t bad = 0U;
+    if (failed) {
+        bad = 1U;
+    }
+    return bad;
+}
+
 static inline uint32_t os_not_finite(const os_real_t *v, uint32_t count)
 {
     uint32_t bad = 0U;
@@ -72,7 +81,8 @@ static inline uint32_t os_scale_rows(const os_real_t *v, uint32_t rows, uint32_t
 {
     uint32_t bad = 0U;
     for (uint32_t i = 0U; i < rows; i++) {
-        const os_real_t *row = &v[(i < valid) ? (i * length) : 0U];
+        const uint32_t source = (i < valid) ? i : 0U;
+        const os_real_t *row = &v[source * length];
         os_real_t largest = (os_real_t)0.0;
         os_real_t square = (os_real_t)0.0;
         for (uint32_t k = 0U; k < length; k++) {

@@ -33,7 +33,10 @@ def test_without_a_compiler_the_files_are_written_and_what_is_unchecked_is_said(
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     export = export_c("dcm_from_quaternion", tmp_path / "flight")
-    assert export.unchecked == ("Not compiled: no cc or gcc or clang on the path.",)
+    assert export.unchecked == (
+        "Not compiled: no cc or gcc or clang on the path.",
+        "MISRA not checked: cppcheck is not on the path.",
+    )
     assert "not measured" in (tmp_path / "flight" / "dcm_from_quaternion.h").read_text()
     assert export.kernels[0].replay is None
 

@@ -15,18 +15,22 @@ class Definition(Protocol):
     @property
     def name(self) -> str:
         """Its name."""
+        ...
 
     @property
     def inputs(self) -> tuple[Port, ...]:
         """Its arguments."""
+        ...
 
     @property
     def outputs(self) -> tuple[Port, ...]:
         """Its results."""
+        ...
 
     @property
     def casadi(self) -> Any:
         """The CasADi function of the same arguments and results."""
+        ...
 
 
 def lower_in_order(definition: Definition, order: Sequence[str]) -> Program:

@@ -12,6 +12,7 @@ settings.load_profile("optsat")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--run-benchmarks", action="store_true", help="also run the tests marked `benchmark`")
+    parser.addoption("--update-golden", action="store_true", help="rewrite the files in tests/golden; review the diff")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -27,6 +28,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def root() -> Path:
     """The folder that holds pyproject.toml."""
     return Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def golden(root: Path, request: pytest.FixtureRequest) -> Callable[[str, str], None]:
+    """Return a check that a text equals tests/golden/NAME, which --update-golden rewrites instead."""
+
+    def check(name: str, text: str) -> None:
+        path = root / "tests" / "golden" / name
+        if request.config.getoption("--update-golden"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        kept = path.read_text(encoding="utf-8") if path.exists() else ""
+        assert text == kept, f"{name} differs from what is kept; if that is meant, run pytest with --update-golden"
+
+    return check
 
 
 @pytest.fixture(scope="session")

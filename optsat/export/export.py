@@ -1,5 +1,6 @@
 """Export: kernels as a folder of freestanding C, written once it was compiled and answered as Python does."""
 
+import json
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -7,9 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from optsat.errors import InputError, explain_unknown_options, nearest_name
 from optsat.export.bundle import Bundle
-from optsat.export.catalogue import Kernel, build
+from optsat.export.catalogue import ARITHMETIC, Kernel, build, entry_named
 from optsat.export.definition import Definition, define
 from optsat.export.interface import Interface
 from optsat.export.misra import check, print_record
@@ -164,7 +167,20 @@ def _definition(kernel: str | Kernel, precision: Precision, parameters: Mapping[
     if not isinstance(kernel, str):
         return define(kernel)
     chosen = parameters.get(kernel, {})
-    return define(build(kernel, precision, **chosen), chosen)
+    return define(build(kernel, precision, **chosen), _baked_in(kernel, precision, chosen))
+
+
+def _baked_in(kernel: str, precision: Precision, chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """Return every parameter of the definition by name, defaults included, as JSON values."""
+    entry = entry_named(kernel)
+    values = {parameter.name: parameter.default for parameter in entry.parameters()}
+    values |= {name: value for name, value in ARITHMETIC[precision].items() if name in values}
+    values |= {**chosen, **entry.fixed}
+    return {name: json.loads(json.dumps(value, default=_as_list)) for name, value in sorted(values.items())}
+
+
+def _as_list(value: Any) -> Any:
+    return np.asarray(value).tolist()
 
 
 def _check_free(folder: Path, names: Sequence[str], force: bool) -> None:

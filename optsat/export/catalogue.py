@@ -123,6 +123,10 @@ CATALOGUE: Mapping[str, Entry] = {
         "optsat.estimators.attitude_filter:unscented_filter_7",
         "unscented Kalman filter step of attitude and angular velocity, star tracker and gyro",
     ),
+    "unscented_filter_7_loops": Entry(
+        "optsat.estimators.unscented_loops:unscented_filter_7_loops",
+        "the same unscented Kalman filter step in loops, for little flash",
+    ),
 }
 """Entry by public name."""
 

@@ -10,9 +10,10 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from optsat.campaign.final_file import write_final_file
@@ -38,9 +39,11 @@ def finish(study: Study, folder: RunFolder, result: StudyResult, tables: Callabl
         study.figure(result.rows, folder.path / FIGURE)
         written.append(FIGURE)
     document = {
+        "run": folder.run,
+        "title": study.title,
         **result.summary(),
         "failed_cases": [asdict(failure) for failure in result.failures],
-        "files": {name: _digest(folder, name) for name in sorted(written)},
+        "files": {name: _digest(folder.path / name) for name in sorted(written)},
     }
     write_atomically(folder.path / COMPLETE, (json.dumps(document, indent=2, allow_nan=False) + "\n").encode())
     folder.manifest.append("finished")
@@ -53,19 +56,28 @@ def finished_result(study: Study, folder: RunFolder, result: StudyResult) -> Stu
     ------
     OptsatError : a file has changed or is gone.
     """
-    document = json.loads((folder.path / COMPLETE).read_text(encoding="utf-8"))
-    for name, digest in document["files"].items():
-        if not (folder.path / name).exists() or _digest(folder, name) != digest:
-            raise OptsatError(
-                f"{folder.path / name} is not the file that the run of {study.name} wrote. Delete {COMPLETE} there and "
-                "run again with --resume to write it anew from the chunks."
-            )
+    check_files(folder.path, json.loads((folder.path / COMPLETE).read_text(encoding="utf-8")))
     return result
 
 
-def _digest(folder: RunFolder, name: str) -> dict[str, Any]:
+def check_files(path: Path, document: Mapping[str, Any]) -> None:
+    """Check the files of a complete run in the folder `path` against the digests of its complete.json.
+
+    Raises
+    ------
+    OptsatError : a file has changed or is gone.
+    """
+    for name, digest in document["files"].items():
+        if not (path / name).exists() or _digest(path / name) != digest:
+            raise OptsatError(
+                f"{path / name} is not the file that the run of {document['study']} wrote. Delete {COMPLETE} there and "
+                "run again with --resume to write it anew from the chunks."
+            )
+
+
+def _digest(file: Path) -> dict[str, Any]:
     sha256, size = hashlib.sha256(), 0
-    with (folder.path / name).open("rb") as stream:
+    with file.open("rb") as stream:
         while block := stream.read(1 << 20):
             sha256.update(block)
             size += len(block)

@@ -21,9 +21,10 @@ REQUIRED = (
     "pint",
     "pydantic",
     "rich",
+    "threadpoolctl",
     "typer",
 )
-EXTRAS = {"peers": ("ahrs",)}
+EXTRAS = {"results": ("h5netcdf", "h5py", "xarray"), "cluster": ("distributed",), "peers": ("ahrs",)}
 
 
 class Health(enum.Enum):

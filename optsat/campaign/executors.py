@@ -14,9 +14,17 @@ from typing import Any, Protocol, TypeAlias
 
 from optsat.campaign.result import Failure
 from optsat.campaign.study import Row
-from optsat.campaign.threads import one_thread_each
+from optsat.campaign.threads import one_thread_each, one_thread_here
 
-Outcomes: TypeAlias = list[Row | Failure]
+
+@dataclass(frozen=True)
+class Outcomes:
+    """What became of some cases, in case order, and the print of the arithmetic that computed them."""
+
+    cases: list[Row | Failure]
+    numerics: str
+
+
 Task: TypeAlias = Callable[[Sequence[int]], Outcomes]
 """Numbers of cases to their outcomes; processes and clusters pickle it."""
 
@@ -46,8 +54,9 @@ class Serial:
 
     def run(self, task: Task, chunks: Sequence[Chunk]) -> Iterator[tuple[Chunk, Outcomes]]:
         """Yield each chunk with its outcomes, in order."""
-        for chunk in chunks:
-            yield chunk, task(chunk.numbers)
+        with one_thread_here():
+            for chunk in chunks:
+                yield chunk, task(chunk.numbers)
 
 
 @dataclass(frozen=True)
@@ -83,8 +92,8 @@ class Processes:
             try:
                 while waiting or running:
                     while waiting and len(running) < 2 * self.workers and attempts[waiting[0].index] < MOST_ATTEMPTS:
-                        chunk = waiting.popleft()
-                        running[_submitted(pool, task, chunk.numbers)] = chunk
+                        running[_submitted(pool, task, waiting[0].numbers)] = waiting[0]
+                        waiting.popleft()
                     if not running:
                         return
                     done, _ = concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED)
@@ -96,6 +105,19 @@ class Processes:
                 lost.extend(sorted(running.values(), key=lambda chunk: chunk.index))
 
 
+def crashed(case: int) -> Outcomes:
+    """Return the outcome of a case that kills every worker."""
+    died = Failure(case, "CRASHED", "the worker process that ran this case died (killed, or out of memory)")
+    return Outcomes([died], "")
+
+
+def joined(parts: Sequence[Outcomes]) -> Outcomes:
+    """Return the outcomes of consecutive cases as one."""
+    return Outcomes(
+        [outcome for part in parts for outcome in part.cases], next((p.numerics for p in parts if p.numerics), "")
+    )
+
+
 def _alone(task: Task, numbers: range) -> Outcomes:
     with _pool(1) as pool:
         try:
@@ -103,9 +125,9 @@ def _alone(task: Task, numbers: range) -> Outcomes:
         except BrokenProcessPool:
             pass
     if len(numbers) == 1:
-        return [Failure(numbers[0], "CRASHED", "the worker process that ran this case died (killed, or out of memory)")]
+        return crashed(numbers[0])
     half = len(numbers) // 2
-    return _alone(task, numbers[:half]) + _alone(task, numbers[half:])
+    return joined([_alone(task, numbers[:half]), _alone(task, numbers[half:])])
 
 
 @contextlib.contextmanager

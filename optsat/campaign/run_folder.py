@@ -19,6 +19,7 @@ from typing import Any
 from optsat.campaign.chunk_file import ChunkError, Columns, read_chunk, write_chunk
 from optsat.campaign.folder_lock import locked
 from optsat.campaign.manifest import Manifest
+from optsat.campaign.numerics import check_same
 from optsat.errors import InputError
 from optsat.files import write_atomically
 
@@ -50,11 +51,13 @@ class Identity:
 class RunFolder:
     """An open run folder; `open_run` makes one and holds its lock."""
 
-    def __init__(self, path: Path, run: str, chunk_size: int, cases: int) -> None:
-        self.path, self.run, self.chunk_size = path, run, chunk_size
+    def __init__(self, path: Path, run: str, chunk_size: int, cases: int, mixed_machines: bool = False) -> None:
+        self.path, self.run, self.chunk_size, self.mixed_machines = path, run, chunk_size, mixed_machines
         self.count = -(-cases // chunk_size)
         self.manifest = Manifest(path / _MANIFEST)
         self._finished = self._examine()
+        events = self.manifest.read()
+        self.numerics: str = next((event["print"] for event in events if event["event"] == "numerics"), "")
 
     def is_complete(self) -> bool:
         """Return whether the final files are there; `finished_result` checks them."""
@@ -64,6 +67,23 @@ class RunFolder:
     def finished(self) -> frozenset[int]:
         """Chunks that are on the disk, whole."""
         return frozenset(self._finished)
+
+    def check_numerics(self, found: str, chunk: int) -> None:
+        """Refuse results of another arithmetic than the first chunk's; a case that crashed has none.
+
+        Raises
+        ------
+        OptsatError : the prints differ, and the mixture was not allowed.
+        """
+        if not found or found == self.numerics:
+            return
+        if not self.numerics:
+            self.numerics = found
+            self.manifest.append("numerics", print=found)
+        elif self.mixed_machines:
+            self.manifest.append("other numerics", print=found, chunk=chunk)
+        else:
+            check_same(self.numerics, found, f"What ran chunk {chunk}")
 
     def store(self, chunk: int, columns: Columns) -> None:
         """Write a finished chunk; when this returns it survives whatever happens."""
@@ -119,11 +139,13 @@ def open_run(
     choose_chunk_size: Callable[[], int],
     provenance: Mapping[str, Any],
     resume: bool = False,
+    mixed_machines: bool = False,
 ) -> Iterator[RunFolder]:
     """Make a run folder, or take up the one that is there, and hold its lock.
 
     choose_chunk_size : cases a chunk, asked for a new folder only; one that is there keeps its own
     resume : allow to go on with an unfinished run
+    mixed_machines : take results of another arithmetic, and write down which
 
     Raises
     ------
@@ -146,7 +168,7 @@ def open_run(
         else:
             chunk_size = _checked(path, identity, resume)
             event = "resumed"
-        folder = RunFolder(path, identity.run, chunk_size, identity.cases)
+        folder = RunFolder(path, identity.run, chunk_size, identity.cases, mixed_machines)
         folder.manifest.append(event, finished=len(folder.finished), **dict(provenance))
         yield folder
 

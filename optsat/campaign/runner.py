@@ -14,12 +14,13 @@ import numpy as np
 
 from optsat._version import __version__
 from optsat.campaign.executors import Chunk, Executor, Outcomes, Processes, Serial, Task
+from optsat.campaign.numerics import numerics_print
 from optsat.campaign.provenance import provenance
 from optsat.campaign.result import Failure, StudyResult
 from optsat.campaign.run_folder import Identity, RunFolder, open_run
 from optsat.campaign.seeds import campaign_key, case_generator
 from optsat.campaign.store import finish, finished_result
-from optsat.campaign.study import Case, Study
+from optsat.campaign.study import Case, Row, Study
 from optsat.campaign.table import Table
 from optsat.errors import InputError, OptsatError
 
@@ -43,6 +44,7 @@ def run_study(
     out: Path | None = None,
     resume: bool = False,
     executor: Executor | None = None,
+    mixed_machines: bool = False,
 ) -> StudyResult:
     """Return the result of a study over its first `cases` cases.
 
@@ -53,6 +55,7 @@ def run_study(
     out : folder that keeps every finished chunk; a run that is complete there is read, not run again
     resume : go on with an unfinished run in `out`
     executor : where the chunks are run; `workers` processes of this machine unless given
+    mixed_machines : take results of machines with another arithmetic into one run; the manifest says which
 
     Raises
     ------
@@ -75,11 +78,11 @@ def run_study(
         chunks = _chunks(count, max(1, min(64, count // (8 * workers))) if workers > 1 else 1)
         tables: dict[int, Table] = {}
         for chunk, outcomes in _reported(executor.run(task, chunks), progress, count, 0):
-            tables[chunk.index] = Table.of(study.name, outcomes)
+            tables[chunk.index] = Table.of(study.name, outcomes.cases)
         return _assembled(study, seed, count, [tables[index] for index in sorted(tables)])
     identity = Identity(study.name, study.version, seed, count, __version__, _source_hash(study))
     size = functools.partial(_chunk_size, study, design, seed, workers)
-    with open_run(out, identity, size, provenance(sys.argv), resume) as folder:
+    with open_run(out, identity, size, provenance(sys.argv), resume, mixed_machines) as folder:
         return _run_in_folder(study, seed, count, executor, task, folder, progress)
 
 
@@ -96,7 +99,8 @@ def _run_in_folder(
     done = count - sum(len(chunk.numbers) for chunk in missing)
     try:
         for chunk, outcomes in _reported(executor.run(task, missing), progress, count, done):
-            folder.store(chunk.index, Table.of(study.name, outcomes).to_arrays())
+            folder.check_numerics(outcomes.numerics, chunk.index)
+            folder.store(chunk.index, Table.of(study.name, outcomes.cases).to_arrays())
     except KeyboardInterrupt:
         folder.manifest.append("interrupted", finished=len(folder.finished))
         raise
@@ -144,7 +148,7 @@ def _source_hash(study: Study) -> str:
 
 def _run_cases(study: Study, design: Sequence[Case], seed: int, numbers: Sequence[int]) -> Outcomes:
     key = campaign_key(study.name, seed)
-    outcomes: Outcomes = []
+    outcomes: list[Row | Failure] = []
     for number in numbers:
         try:
             row = study.run(design[number], case_generator(key, number))
@@ -152,7 +156,7 @@ def _run_cases(study: Study, design: Sequence[Case], seed: int, numbers: Sequenc
             outcomes.append(Failure(number, type(error).__name__, str(error)))
         else:
             outcomes.append({"case": number, **{name: _value(study, number, name, row[name]) for name in row}})
-    return outcomes
+    return Outcomes(outcomes, numerics_print())
 
 
 def _value(study: Study, number: int, name: str, value: object) -> object:

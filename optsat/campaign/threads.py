@@ -1,4 +1,4 @@
-"""One thread for each worker: more would fight for the cores and change the last bits of BLAS."""
+"""One thread for each worker, and for a run in this process: more would change the last bits of BLAS."""
 
 import contextlib
 import os
@@ -20,3 +20,12 @@ def one_thread_each() -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+@contextlib.contextmanager
+def one_thread_here() -> Iterator[None]:
+    """Hold the linear algebra that is loaded in this process to one thread."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        yield

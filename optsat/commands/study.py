@@ -35,6 +35,13 @@ def run_command(
     cases: Annotated[int | None, typer.Option(min=1, help="Number of cases; the study's own when absent.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the campaign.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Worker processes; the rows are the same for any number.")] = 1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="tcp://HOST:PORT", help="Run on the Dask cluster at this address.", show_default=False),
+    ] = None,
+    mixed_machines: Annotated[
+        bool, typer.Option("--mixed-machines", help="Allow results of machines with other last bits in one run.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder that keeps every finished chunk and the result.", show_default=False),
@@ -44,11 +51,13 @@ def run_command(
 ) -> None:
     """Run a study and judge its claims. Exit code 1 when a case failed or a bar of our own fails."""
     from optsat.campaign.catalogue import load_study
+    from optsat.campaign.dask_executor import Dask
     from optsat.campaign.runner import run_study
 
     study = load_study(name)
     with progress_bar(study.name) as report:
-        result = run_study(study, cases, seed, workers, report, out, resume)
+        executor = None if scheduler is None else Dask(scheduler)
+        result = run_study(study, cases, seed, workers, report, out, resume, executor, mixed_machines)
     if out is not None:
         note(f"Written to {out}.")
     if as_json:

@@ -1,0 +1,135 @@
+"""A campaign on a Dask cluster of two workers on the loopback: the same bytes, deaths survived, faults in words."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import slow_study
+
+from optsat.campaign import runner
+from optsat.campaign.dask_executor import Dask
+from optsat.campaign.runner import run_study
+from optsat.errors import InputError, OptsatError
+
+pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+
+CASES = 60
+DEADLY = 17
+
+
+def _start(module: str, folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[3])]),
+        **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
+    }
+    with (folder / "log").open("ab") as log:
+        command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments]
+        return subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log, start_new_session=True)
+
+
+def _wait(ready: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not ready():
+        assert time.monotonic() < end, "the cluster did not start"
+        time.sleep(0.05)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    folder = tmp_path_factory.mktemp("cluster")
+    file = folder / "scheduler.json"
+    local = ("--host", "127.0.0.1")
+    scheduler = _start(
+        "dask_scheduler",
+        folder,
+        *local,
+        "--port",
+        "0",
+        "--dashboard-address",
+        "127.0.0.1:0",
+        "--scheduler-file",
+        str(file),
+    )
+    processes = [scheduler]
+    try:
+        _wait(lambda: file.exists() and file.stat().st_size > 0)
+        for _ in range(2):
+            options = (
+                *local,
+                "--nthreads",
+                "1",
+                "--no-dashboard",
+                "--death-timeout",
+                "30",
+                "--scheduler-file",
+                str(file),
+            )
+            processes.append(_start("dask_worker", folder, *options))
+        yield json.loads(file.read_text())["address"]
+    finally:
+        for process in processes:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "_chunk_size", lambda *_arguments: 7)
+
+
+def _bytes(folder: Path) -> tuple[bytes, bytes]:
+    return (folder / "result.nc").read_bytes(), (folder / "summary.csv").read_bytes()
+
+
+def test_a_cluster_gives_the_same_bytes(cluster: str, tmp_path: Path) -> None:
+    run_study(slow_study.study, cases=CASES, out=tmp_path / "serial")
+    result = run_study(slow_study.study, cases=CASES, out=tmp_path / "dask", executor=Dask(cluster))
+    assert result.passed
+    assert _bytes(tmp_path / "dask") == _bytes(tmp_path / "serial")
+
+
+def test_without_a_cluster(tmp_path: Path) -> None:
+    with pytest.raises(OptsatError, match=r"No Dask scheduler answers at tcp://127.0.0.1:9"):
+        run_study(slow_study.study, cases=2, executor=Dask("tcp://127.0.0.1:9", connect_s=0.5))
+    with pytest.raises(OptsatError, match="No Dask scheduler answers"):
+        run_study(slow_study.study, cases=2, executor=Dask("nonsense", connect_s=0.5))
+
+
+def test_a_study_that_workers_cannot_import(cluster: str) -> None:
+    import dataclasses
+
+    with pytest.raises(InputError, match="holds another object"):
+        run_study(dataclasses.replace(slow_study.study, title="a copy"), cases=2, executor=Dask(cluster))
+
+
+def test_another_version_on_the_workers_is_refused(cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("optsat.campaign.dask_executor.__version__", "9.9")
+    with pytest.raises(OptsatError, match=r"Every worker needs optsat 9.9: tcp://.* has "):
+        run_study(slow_study.study, cases=2, executor=Dask(cluster))
+
+
+def test_another_arithmetic_is_refused_unless_allowed(
+    cluster: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(runner, "numerics_print", lambda: "another")
+
+        def stop(done: int, _total: int) -> None:
+            if done >= 14:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run_study(slow_study.study, cases=CASES, out=tmp_path, progress=stop)
+    with pytest.raises(OptsatError, match=r"computes with other last bits.*--mixed-machines"):
+        run_study(slow_study.study, cases=CASES, out=tmp_path, resume=True, executor=Dask(cluster))
+    result = run_study(
+        slow_study.study, cases=CASES, out=tmp_path, resume=True, executor=Dask(cluster), mixed_machines=True
+    )
+    assert result.passed
+    assert b'"event":"other numerics"' in (tmp_path / "manifest").read_bytes()

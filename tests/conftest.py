@@ -1,6 +1,7 @@
 """Options, profiles and fixtures shared by all tests."""
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -56,3 +57,14 @@ def shared_data(root: Path) -> Callable[[str], Path]:
         return path
 
     return lookup
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _kernels_of_the_tests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Compiled kernels go to a folder of this run, so that no test finds or leaves any elsewhere."""
+    if "OPTSAT_CACHE" in os.environ:
+        yield
+        return
+    os.environ["OPTSAT_CACHE"] = str(tmp_path_factory.mktemp("kernels"))
+    yield
+    del os.environ["OPTSAT_CACHE"]

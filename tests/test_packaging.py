@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 LINKS = ("problems", "solvers", "studies")
+COMPILED = (".so", ".pyd")
 
 
 def run(*command: str, cwd: Path, expected: int = 0) -> subprocess.CompletedProcess[str]:
@@ -71,9 +72,36 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def modules(path: Path) -> dict[str, bytes]:
-    """The files of a wheel with their bytes, without the notes about the distribution."""
+    """The files of a wheel with their bytes, without the notes about the distribution and what was compiled."""
     with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist() if ".dist-info/" not in name}
+        return {
+            name: archive.read(name)
+            for name in archive.namelist()
+            if ".dist-info/" not in name and not name.endswith(COMPILED)
+        }
+
+
+def test_the_wheel_holds_what_was_compiled_where_a_compiler_is(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        compiled = [name for name in archive.namelist() if name.endswith(COMPILED)]
+    if shutil.which("cc") or shutil.which("gcc"):
+        # by the limited API, for every later Python too
+        assert compiled == ["optsat/kernels/_binding.abi3.so"]
+        assert "-cp311-abi3-" in wheel.name
+    else:
+        assert compiled == []
+
+
+def test_without_a_compiler_the_wheel_is_whole(
+    clean_copy: Path, wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(clean_copy, copy, symlinks=True, ignore=shutil.ignore_patterns("build", "*.egg-info"))
+    monkeypatch.setenv("CC", "/nonexistent")
+    interpreted = build(copy, tmp_path / "out", "wheel")
+    assert modules(interpreted) == modules(wheel)
+    with zipfile.ZipFile(interpreted) as archive:
+        assert not [name for name in archive.namelist() if name.endswith(COMPILED)]
 
 
 def test_the_wheel_holds_the_tracked_files_and_nothing_else(root: Path, tracked: dict[str, str], wheel: Path) -> None:

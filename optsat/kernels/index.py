@@ -1,0 +1,116 @@
+"""Index: from the definition of a kernel to its key, so that a kernel in the cache is used without building it again.
+
+A note names the files that the definition could depend on: the modules that were loaded when it was built, of optsat
+and of the definition's own package, and those that tell the versions of CasADi and NumPy. It holds as long as none of
+them changed. FOLDER/index/REQUEST/MACHINE.json; which machine and compiler is part of the name.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from optsat.files import write_atomically
+from optsat.kernels.fingerprint import compiler_identity
+from optsat.kernels.folders import searched_folders, writable_folders
+from optsat.kernels.processor import identity
+from optsat.kernels.request import Request
+from optsat.kernels.toolchain import CompilerMissingError, find_compiler
+from optsat.kernels.unit import ABI
+
+_LIBRARIES = ("casadi", "casadi.casadi", "casadi._casadi", "numpy")
+
+
+def find_key(wanted: Request) -> str | None:
+    """Return the key that this request had, None where it was never made here or a file has changed since."""
+    request, machine = _request_name(wanted), _machine_name()
+    for folder in searched_folders():
+        place = folder / "index" / request
+        for note in _candidates(place, machine):
+            if (key := _key_of(note)) is not None:
+                return key
+    return None
+
+
+def note_key(wanted: Request, key: str) -> None:
+    """Remember the key of a request that was just built in this process; where nothing can be written, do not."""
+    document = {"key": key, "files": [_described(path) for path in _files(wanted)]}
+    for folder in writable_folders():
+        place = folder / "index" / _request_name(wanted)
+        try:
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)
+            write_atomically(place / f"{_machine_name() or 'any'}.json", json.dumps(document).encode(), mode=0o600)
+            return
+        except OSError:
+            continue
+
+
+def _candidates(place: Path, machine: str) -> Iterator[Path]:
+    if machine:
+        yield place / f"{machine}.json"
+    else:
+        # without a compiler, what another made is better than nothing; the loader passes over other processors' code
+        with contextlib.suppress(OSError):
+            yield from sorted(place.iterdir())
+
+
+def _key_of(note: Path) -> str | None:
+    try:
+        document = json.loads(note.read_bytes())
+        key: str = document["key"]
+        fresh = all(_is_unchanged(*described) for described in document["files"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    return key if fresh else None
+
+
+def _is_unchanged(path: str, size: int, time: int, digest: str) -> bool:
+    status = os.stat(path)
+    if status.st_size != size:
+        return False
+    # a copy or a checkout gives old text a new time
+    return status.st_mtime_ns == time or _digest(path) == digest
+
+
+def _described(path: str) -> list[Any]:
+    status = os.stat(path)
+    return [path, status.st_size, status.st_mtime_ns, _digest(path)]
+
+
+def _digest(path: str) -> str:
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _files(wanted: Request) -> list[str]:
+    packages = {"optsat", wanted.definition.partition(":")[0].partition(".")[0]}
+    modules = {
+        module.__file__
+        for name, module in list(sys.modules.items())
+        if (name.partition(".")[0] in packages or name in _LIBRARIES) and getattr(module, "__file__", None)
+    }
+    texts = {
+        str(path)
+        for part in ("c", "templates")
+        for path in Path(__file__).parent.joinpath(part).iterdir()
+        if path.suffix in (".c", ".h")
+    }
+    return sorted(path for path in modules | texts if path is not None and os.path.isfile(path))
+
+
+def _request_name(wanted: Request) -> str:
+    # two installations have files of their own
+    known = [wanted.definition, wanted.parameters, wanted.real, str(ABI), os.path.dirname(__file__)]
+    return hashlib.sha256("\n".join(known).encode()).hexdigest()
+
+
+def _machine_name() -> str:
+    try:
+        compiler = compiler_identity(find_compiler())
+    except CompilerMissingError:
+        return ""
+    return hashlib.sha256(f"{identity()}\n{compiler}".encode()).hexdigest()[:32]

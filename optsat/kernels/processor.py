@@ -1,0 +1,71 @@
+"""Processor: what tells one machine from another where compiled code is concerned."""
+
+import hashlib
+import os
+import platform
+import re
+from functools import cache
+
+import numpy as np
+
+from optsat.errors import OptsatError
+
+# words of /proc/cpuinfo that name no instruction a compiler could use
+_NO_INSTRUCTIONS = """apic arat constant_tsc cpuid fsrm hypervisor lahf_lm mca mce mtrr nonstop_tsc nopl nx pae pat pge pse pse36
+    rep_good smap smep syscall topoext tsc tsc_adjust tsc_deadline_timer tsc_known_freq umip vme wbnoinvd
+    x2apic"""
+
+
+class DenormalsFlushedError(OptsatError):
+    """The processor replaces denormal numbers by zero, so that no result would have its bits."""
+
+
+@cache
+def features() -> frozenset[str]:
+    """Return the instruction sets of this processor as the operating system names them; empty where it does not say."""
+    try:
+        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as stream:
+            # the first processor stands for all; the whole file takes long on a large machine
+            text = stream.read(8192)
+    except OSError:
+        return frozenset()
+    found = re.search(r"^(?:flags|Features)\s*:(.*)$", text, re.MULTILINE)
+    return frozenset(found[1].split()) - frozenset(_NO_INSTRUCTIONS.split()) if found else frozenset()
+
+
+@cache
+def identity() -> str:
+    """Return a digest of architecture, instruction sets and C library: what compiled code and its bits depend on."""
+    known = [platform.machine(), c_library(), *(sorted(features()) or [platform.processor()])]
+    return hashlib.sha256("\n".join(known).encode()).hexdigest()
+
+
+@cache
+def c_library() -> str:
+    """Return name and version of the C library, such as "glibc 2.36"."""
+    try:
+        return os.confstr("CS_GNU_LIBC_VERSION") or platform.system()
+    except (AttributeError, ValueError, OSError):
+        return f"{platform.system()} {platform.release()}"
+
+
+def lane_width() -> int:
+    """Return how many doubles this processor works on at once: 8, 4 or 2."""
+    if "avx512f" in features():
+        return 8
+    return 4 if "avx" in features() else 2
+
+
+def check_denormals() -> None:
+    """Assert that this thread computes with denormal numbers.
+
+    Raises
+    ------
+    DenormalsFlushedError : some library has switched them off, as those linked with -ffast-math do.
+    """
+    smallest, tiny = np.array([5e-324]), np.array([np.finfo(float).tiny])
+    if (smallest * 2.0**100)[0] == 0.0 or (tiny * 0.5)[0] == 0.0:
+        raise DenormalsFlushedError(
+            "The processor replaces denormal numbers by zero, so results would differ in their last bits: a library in "
+            "this process was linked with -ffast-math. Import optsat without it, or rebuild that library."
+        )

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 from optsat.errors import InputError, nearest_name
 from optsat.kernels.lowering import lower
-from optsat.kernels.program import Input, Node, Pattern, Program
+from optsat.kernels.program import Program
 from optsat.port import Port
 
 
@@ -50,6 +50,11 @@ def lower_in_order(definition: Definition, order: Sequence[str]) -> Program:
     )
 
 
+def lower_or(definition: Definition | None, otherwise: Program) -> Program:
+    """Return the program of a definition, or the other one where there is none."""
+    return otherwise if definition is None else lower_in_order(definition, [port.name for port in definition.inputs])
+
+
 def port_of(definition: Definition, name: str) -> Port:
     """Return the argument of that name.
 
@@ -61,10 +66,3 @@ def port_of(definition: Definition, name: str) -> Port:
     if name not in ports:
         raise InputError(f"{definition.name} has no argument `{name}`.{nearest_name(name, list(ports))}")
     return ports[name]
-
-
-def identity(name: str, n: int) -> Program:
-    """Return the program that copies a column of n numbers."""
-    column = Pattern("x", n, 1, (0, n), tuple(range(n)))
-    nodes: tuple[Node, ...] = tuple(Input(0, k) for k in range(n))
-    return Program(name, (column,), (column,), nodes, (tuple(range(n)),))

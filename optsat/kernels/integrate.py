@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from typing import Literal
 
 from optsat.errors import InputError
-from optsat.kernels.definition import Definition, identity, lower_in_order, port_of
+from optsat.kernels.definition import Definition, lower_in_order, lower_or, port_of
 from optsat.kernels.evaluate import evaluator
 from optsat.kernels.instantiate import instantiate, operation_count
 from optsat.kernels.sizes import check_size
+from optsat.kernels.slots import identity
 from optsat.kernels.source import KernelSource
 from optsat.kernels.twins import integrate as twins
 from optsat.port import Port
@@ -114,7 +115,7 @@ def integrate(
         raise InputError(
             f"{kernel}: the arguments of {one_step.name} must be its states, inputs, time and dt in order."
         )
-    back = identity("restore", n) if restore is None else lower_in_order(restore, [p.name for p in restore.inputs])
+    back = lower_or(restore, identity("restore", n))
     rows = steps // every + 1
     if (numbers := rows * n + (m if held else steps * m)) > LARGEST:
         raise InputError(

@@ -4,10 +4,10 @@ import math
 from typing import Literal
 
 from optsat.errors import InputError
-from optsat.kernels.definition import Definition, identity, lower_in_order
+from optsat.kernels.definition import Definition, lower_in_order, lower_or
 from optsat.kernels.evaluate import evaluator
 from optsat.kernels.instantiate import instantiate
-from optsat.kernels.program import Input, Operation, Pattern, Program
+from optsat.kernels.slots import column, identity, of_one, second
 from optsat.kernels.source import KernelSource
 from optsat.kernels.twins.sigma_points import SigmaPointTwin
 from optsat.port import Port
@@ -51,13 +51,12 @@ def sigma_point_filter(
         raise InputError(f"{name}: f and h must take the same arguments and give one result each.")
     x, u_ports, (z,) = f.inputs[0], f.inputs[1:], h.outputs
     n, m, u = x.size, z.size, sum(port.size for port in u_ports)
-    logarithm = Program("log", (_column(1),), (_column(1),), (Input(0, 0), Operation("LOG", (0,))), ((1,),))
     leaves = {
         "f": lower_in_order(f, names),
         "h": lower_in_order(h, names),
-        "restore": _program(restore, identity("restore", n)),
-        "near": _program(near, _second("near", m)),
-        "log": logarithm,
+        "restore": lower_or(restore, identity("restore", n)),
+        "near": lower_or(near, second("near", column(m, "expected"), column(m, "z"))),
+        "log": of_one("LOG"),
     }
     constants = {
         "DISTANCE": math.sqrt(spread),
@@ -100,17 +99,3 @@ def _noise(name: str, size: int, noise: str) -> Port:
     if noise == "diagonal":
         return Port(f"{name}_diagonal", (size,), "SI", lower=0.0)
     raise InputError(f"`noise` must be 'full' or 'diagonal', got {noise!r}.")
-
-
-def _column(n: int, name: str = "x") -> Pattern:
-    return Pattern(name, n, 1, (0, n), tuple(range(n)))
-
-
-def _second(name: str, m: int) -> Program:
-    """The program that returns the second of two columns."""
-    inputs = (_column(m, "expected"), _column(m, "z"))
-    return Program(name, inputs, (_column(m),), tuple(Input(1, k) for k in range(m)), (tuple(range(m)),))
-
-
-def _program(definition: Definition | None, otherwise: Program) -> Program:
-    return otherwise if definition is None else lower_in_order(definition, [port.name for port in definition.inputs])

@@ -1,4 +1,4 @@
-"""Lane sums: sums along a vector as the templates form them."""
+"""Lane sums: sums along a vector as the templates form them, and the matrix that a lower triangle stands for."""
 
 import numpy as np
 
@@ -18,3 +18,8 @@ def dot(a: Array, b: Array) -> float:
 def largest(a: Array) -> float:
     """Return the largest absolute value of a vector, 0 of none; a NaN counts for nothing."""
     return float(np.fmax.reduce(np.abs(a), initial=0.0))
+
+
+def symmetric(lower: Array) -> Array:
+    """Return the symmetric matrix that has the lower triangle of this one."""
+    return np.where(np.tri(len(lower), dtype=bool), lower, lower.T)

@@ -6,7 +6,7 @@ from optsat.arrays import Array
 from optsat.kernels.sizes import padded
 from optsat.kernels.source import Twin
 from optsat.kernels.status import Status
-from optsat.kernels.twins.lane_sums import dot, largest
+from optsat.kernels.twins.lane_sums import dot, largest, symmetric
 
 _EPSILON = float(np.finfo(float).eps)
 
@@ -16,8 +16,7 @@ def twin(n: int) -> Twin:
 
     def run(x: Array) -> tuple[int, Array]:
         matrix, given = np.zeros((n, padded(n))), np.zeros(padded(n))
-        upper = np.triu(x[: n * n].reshape(n, n))
-        matrix[:, :n] = np.where(np.tri(n, dtype=bool), upper.T, upper)
+        matrix[:, :n] = symmetric(x[: n * n].reshape(n, n).T)
         given[:n] = x[n * n :]
         y = np.full(n + 2, np.nan)
         status = Status.RANGE

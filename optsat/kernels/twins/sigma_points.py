@@ -8,6 +8,7 @@ import numpy as np
 from optsat.arrays import Array
 from optsat.kernels.evaluate import Leaf
 from optsat.kernels.status import Status
+from optsat.kernels.twins.lane_sums import symmetric
 
 _EPSILON = float(np.finfo(float).eps)
 
@@ -110,8 +111,7 @@ def _add_noise(covariance: Array, noise: Array) -> None:
     if noise.size == n:
         covariance[np.diag_indices(n)] += noise
     else:
-        lower = np.tril(noise.reshape(n, n))
-        covariance += lower + np.tril(lower, -1).T
+        covariance += symmetric(noise.reshape(n, n))
 
 
 def _ordered_dot(a: Array, b: Array) -> float:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from optsat.arrays import Array
 from optsat.errors import InputError, explain_unknown_options, nearest_name
-from optsat.forms import Point
+from optsat.forms import MinMaxForm, Point
 from optsat.multistart import sobol_starts
 from optsat.solution import Proof, Solution, Termination
 from optsat.solve import Solver, solve
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from optsat.problems.goal_attainment import Attainment, GoalAttainment
     from optsat.problems.minimax import Minimax
 
+# KKT residual of an answer that is taken without trying the next engine
+_ACCURATE = 1e-8
 # factors closer than this, relative to their size (at least 1), count as equal
 _SAME = 1e-9
 
@@ -164,7 +167,8 @@ def minimax(
 class EngineRun:
     """One run of one engine, judged by re-evaluation.
 
-    start : number of the start; kkt, violation : recomputed residuals; seconds : wall time of the run
+    start : number of the start, one past the last where the best answer was taken up again
+    kkt, violation : recomputed residuals; seconds : wall time of the run
     verdict : why the answer was taken, or why the next engine was tried
     """
 
@@ -189,21 +193,35 @@ def _best(
 ) -> "Solution[Attainment]":
     form = problem.lower()
     engines = _engines(form, engine)
+    # one engine of each method takes its turn at the further starts, since each falls into other local optima
+    methods = list({type(each): each for each in reversed(engines)}.values())[::-1]
     found: list[Solution[Attainment]] = []
     runs: list[EngineRun] = []
-    for number, x in enumerate(sobol_starts(form.start, form.lower, form.upper, starts, seed)):
-        dual = start.answer.dual if number == 0 and isinstance(start, Solution) else np.zeros(0)
-        for each in engines:
+
+    def run(chosen: "list[Solver]", number: int, x: Array, dual: Array) -> None:
+        for each in chosen:
             began = perf_counter()
-            solution = solve(problem, each, Point(x, dual, Termination.CONVERGED))
-            runs.append(_judged(solution, each.name, number, perf_counter() - began))
-            found.append(solution)
-            if solution.proof in (Proof.STATIONARY, Proof.GLOBAL, Proof.INFEASIBLE):
+            found.append(solve(problem, each, Point(x, dual, Termination.CONVERGED)))
+            runs.append(_judged(found[-1], each.name, number, perf_counter() - began))
+            if _settled(found[-1]):
                 break
-        if found[-1].proof in (Proof.GLOBAL, Proof.INFEASIBLE):
+
+    points = sobol_starts(form.start, form.lower, form.upper, starts, seed)
+    run(engines, 0, points[0], start.answer.dual if isinstance(start, Solution) else np.zeros(0))
+    for number, x in enumerate(points[1:], 1):
+        if any(each.proof in (Proof.GLOBAL, Proof.INFEASIBLE) for each in found):
             break
+        if _defined(form, x):
+            run([methods[number % len(methods)]], number, x, np.zeros(0))
     best = _chosen(found)
+    if starts > 1 and not _settled(best):
+        run(engines, len(points), best.answer.x, np.zeros(0))
+        best = _chosen(found)
     return replace(best, stats={**best.stats, "runs": tuple(runs)})
+
+
+def _defined(form: MinMaxForm, x: Array) -> bool:
+    return bool(np.all(np.isfinite(form.objectives.values(x))) and np.all(np.isfinite(form.constraints.values(x))))
 
 
 def _engines(form: object, engine: "str | Solver") -> "list[Solver]":
@@ -222,10 +240,10 @@ def _engines(form: object, engine: "str | Solver") -> "list[Solver]":
 
 def _judged(solution: "Solution[Attainment]", engine: str, start: int, seconds: float) -> EngineRun:
     kkt, violation = (solution.residuals.get(name, float("inf")) for name in ("kkt", "violation"))
-    if solution.proof in (Proof.STATIONARY, Proof.GLOBAL, Proof.INFEASIBLE):
+    if _settled(solution):
         verdict = f"taken: {solution.proof.value}"
-    elif solution.proof is Proof.FEASIBLE:
-        verdict = f"not stationary: KKT residual {kkt:.2g}"
+    elif solution.proof in (Proof.FEASIBLE, Proof.STATIONARY):
+        verdict = f"not accurate: KKT residual {kkt:.2g}"
     elif solution.answer.violated:
         verdict = "infeasible: " + ", ".join(f"{name} by {by:.2g}" for name, by in solution.answer.violated.items())
     else:
@@ -242,6 +260,12 @@ def _judged(solution: "Solution[Attainment]", engine: str, start: int, seconds: 
         seconds=seconds,
         verdict=verdict,
     )
+
+
+def _settled(solution: "Solution[Attainment]") -> bool:
+    if solution.proof is Proof.STATIONARY:
+        return solution.residuals["kkt"] <= _ACCURATE
+    return solution.proof in (Proof.GLOBAL, Proof.INFEASIBLE)
 
 
 def _chosen(found: "list[Solution[Attainment]]") -> "Solution[Attainment]":

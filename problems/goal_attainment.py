@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from optsat.arrays import Array, finite_array
 from optsat.attitude.backend import is_symbolic
+from optsat.certificates.convex_rows import convex_rows
+from optsat.certificates.dual_bound import dual_bound
 from optsat.certificates.first_order import FirstOrder, first_order
 from optsat.errors import InputError, explain_unknown_fields
 from optsat.forms import MinMaxForm, Point
@@ -20,6 +22,8 @@ from optsat.solution import Proof, Solution, Termination
 FEASIBLE = 1e-8
 # of the KKT residual
 STATIONARY = 1e-6
+# of the gap between the factor and its dual bound, relative to the factor (at least 1)
+GLOBAL = 1e-7
 # slack, relative to the size of the bound, below which a row is listed as active
 _ACTIVE = 1e-6
 
@@ -165,14 +169,21 @@ class GoalAttainment:
             answer = self._answer(x, objectives, None)
             return Solution(answer, Termination.NUMERICAL_ERROR, Proof.NOTHING, {"kkt": np.inf}, None, stats)
         state = first_order(form, x, point.dual)
+        residuals = _residuals(form, state)
         proof = Proof.NOTHING
         if state.violation <= FEASIBLE:
             proof = Proof.STATIONARY if state.residual <= STATIONARY else Proof.FEASIBLE
+            convex = convex_rows(form)
+            if convex is not None:
+                factor = form.factor(objectives)
+                residuals["gap"] = factor - dual_bound(form, convex, state, x)
+                if residuals["gap"] <= GLOBAL * max(1.0, abs(factor)):
+                    proof = Proof.GLOBAL
         return Solution(
             answer=self._answer(x, objectives, state),
             termination=point.termination,
             proof=proof,
-            residuals=_residuals(form, state),
+            residuals=residuals,
             stats=stats,
         )
 

@@ -9,6 +9,8 @@ from optsat.solvers.clarabel import Clarabel
 from optsat.solvers.davenport import Davenport
 from optsat.solvers.ipopt import Ipopt
 from optsat.solvers.scaled_semidefinite import ScaledSemidefinite
+from optsat.solvers.slsqp import Slsqp
+from optsat.solvers.sqp import Sqp
 from optsat.solvers.subpaving import SubpavingSolver
 from optsat.solvers.svd import SingularValues
 from optsat.solvers.two_vector import Triad, TwoVector
@@ -26,4 +28,8 @@ SOLVERS: tuple[Solver, ...] = (
     SubpavingSolver(),
     Clarabel(),
     Ipopt(),
+    Sqp("daqp"),
+    Sqp("osqp"),
+    Sqp("ipqp"),
+    Slsqp(),
 )

@@ -52,11 +52,11 @@ def run_epigraph(
         arguments |= {"lam_g0": start.dual[:rows], "lam_x0": np.append(start.dual[rows:], 0.0)}
     try:
         result = solver(**arguments)
+        stats = solver.stats()
     except RuntimeError as error:
         # CasADi raises where a function cannot be evaluated at the first point or a linear solver gives up
         reason = str(error).strip().splitlines()[-1]
         return Point(x0, np.zeros(0), Termination.NUMERICAL_ERROR, stats={"status": reason})
-    stats = solver.stats()
     status = str(stats["return_status"])
     return Point(
         x=_column(result["x"])[:-1],

@@ -38,6 +38,7 @@ class Ipopt:
         options = {
             "print_time": False,
             "calc_lam_p": False,
+            "show_eval_warnings": False,
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
             "ipopt.tol": self.tolerance,

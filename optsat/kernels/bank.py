@@ -4,14 +4,12 @@ import math
 from collections.abc import Sequence
 
 from optsat.errors import InputError
-from optsat.kernels.definition import Definition, lower_in_order, lower_or
-from optsat.kernels.evaluate import Leaf, evaluator
-from optsat.kernels.instantiate import instantiate
-from optsat.kernels.leaf import leaf_source
+from optsat.kernels.definition import Definition, lower_or, with_twin
+from optsat.kernels.evaluate import evaluator
+from optsat.kernels.instantiate import instantiate, operation_count
 from optsat.kernels.sizes import check_size
 from optsat.kernels.slots import column, identity, of_one, second
-from optsat.kernels.source import KernelSource, Twin
-from optsat.kernels.status import Status
+from optsat.kernels.source import KernelSource
 from optsat.kernels.twins.bank import BankTwin
 from optsat.port import Port
 
@@ -59,13 +57,13 @@ def bank(
             f"{kernel}: `floor` must be in (0, {LARGEST_FLOOR:g}], got {floor!r}: with a larger one, modes that are "
             "impossible push their far-off states into the others. For likelier changes of mode raise `transition`."
         )
-    one, run = _with_twin(each)
-    n = _check_ports(kernel, one, per_mode)
-    places, strides, ports, transition = _layout(one.inputs[2:], per_mode, modes, n)
+    n = _check_ports(kernel, each, per_mode)
+    one, run = with_twin(each, [port.name for port in each.inputs])
+    places, strides, ports, transition = _layout(each.inputs[2:], per_mode, modes, n)
     starts = [0]
-    for port in one.outputs:
+    for port in each.outputs:
         starts.append(starts[-1] + port.size)
-    offset = {port.name: start for port, start in zip(one.outputs, starts, strict=False)}
+    offset = {port.name: start for port, start in zip(each.outputs, starts, strict=False)}
     likelihood = offset["log_likelihood"]
     programs = {
         "restore": lower_or(restore, identity("restore", n)),
@@ -115,21 +113,11 @@ def bank(
             definite=definite,
             floor=math.log(floor),
         ),
-        operations=modes * one.operations + (modes + 1) * modes * (3 * n + 2 * n * (n + 1)) + 4 * modes * modes,
+        operations=modes * operation_count(one) + (modes + 1) * modes * (3 * n + 2 * n * (n + 1)) + 4 * modes * modes,
     )
 
 
-def _with_twin(each: Definition | KernelSource) -> tuple[KernelSource, Twin]:
-    if isinstance(each, KernelSource):
-        if each.twin is None:
-            raise InputError(f"{each.name} is straight-line code; give the function that it was made of instead.")
-        return each, each.twin
-    program = lower_in_order(each, [port.name for port in each.inputs])
-    leaf: Leaf = evaluator(program)
-    return leaf_source(program, each.inputs, each.outputs), lambda x: (int(Status.OK), leaf(x))
-
-
-def _check_ports(kernel: str, one: KernelSource, per_mode: Sequence[str]) -> int:
+def _check_ports(kernel: str, one: Definition | KernelSource, per_mode: Sequence[str]) -> int:
     first, results = [port.name for port in one.inputs[:2]], [port.name for port in one.outputs]
     if first != ["x", "P"] or results[:2] != ["x", "P"] or "log_likelihood" not in results:
         raise InputError(

@@ -4,8 +4,11 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from optsat.errors import InputError, nearest_name
+from optsat.kernels.evaluate import evaluator
 from optsat.kernels.lowering import lower
 from optsat.kernels.program import Program
+from optsat.kernels.source import KernelSource, Twin
+from optsat.kernels.status import Status
 from optsat.port import Port
 
 
@@ -55,7 +58,33 @@ def lower_or(definition: Definition | None, otherwise: Program) -> Program:
     return otherwise if definition is None else lower_in_order(definition, [port.name for port in definition.inputs])
 
 
-def port_of(definition: Definition, name: str) -> Port:
+def twin_of(program: Program) -> Twin:
+    """Return the program run in Python, with the status that straight-line code has."""
+    leaf = evaluator(program)
+    return lambda x: (int(Status.OK), leaf(x))
+
+
+def with_twin(each: Definition | KernelSource, order: Sequence[str]) -> tuple[Program | KernelSource, Twin]:
+    """Return what fills a slot, its arguments in that order, and the same in Python.
+
+    Raises
+    ------
+    InputError : a kernel takes them in another order, or is straight-line code and has no twin.
+    """
+    if not isinstance(each, KernelSource):
+        program = lower_in_order(each, order)
+        return program, twin_of(program)
+    if [port.name for port in each.inputs] != list(order):
+        raise InputError(
+            f"{each.name} must take {', '.join(order)} in this order, it takes "
+            f"{', '.join(port.name for port in each.inputs)}."
+        )
+    if each.twin is None:
+        raise InputError(f"{each.name} is straight-line code; give the function that it was made of instead.")
+    return each, each.twin
+
+
+def port_of(definition: Definition | KernelSource, name: str) -> Port:
     """Return the argument of that name.
 
     Raises

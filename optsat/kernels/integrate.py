@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Literal
 
 from optsat.errors import InputError
-from optsat.kernels.definition import Definition, lower_in_order, lower_or, port_of
+from optsat.kernels.definition import Definition, lower_in_order, lower_or, port_of, with_twin
 from optsat.kernels.evaluate import evaluator
-from optsat.kernels.instantiate import instantiate, operation_count
+from optsat.kernels.instantiate import Leaf, instantiate, operation_count
 from optsat.kernels.sizes import check_size
 from optsat.kernels.slots import identity
 from optsat.kernels.source import KernelSource
@@ -20,7 +20,7 @@ Method = Literal["runge_kutta_4", "midpoint", "lie_group"]
 
 
 def step(
-    rate: Definition,
+    rate: Definition | KernelSource,
     states: Sequence[str],
     method: Method = "runge_kutta_4",
     time: str | None = None,
@@ -29,7 +29,8 @@ def step(
 ) -> KernelSource:
     """Return the kernel of one step: (states..., inputs..., time, dt) -> states, its results named as its arguments.
 
-    rate : whose results joined are the rates of the states joined; its other arguments are held over the step
+    rate : whose results joined are the rates of the states joined; its other arguments are held over the step. A kernel
+        must take them in the order states, inputs, time.
     method : "lie_group" takes `move` and rates of displacement: (states..., displacement) -> states, the displacement
         acting from the identity, so that constraints such as |q| = 1 hold without a correction
     time : the argument that is time [s]; name : of the kernel, RATE_METHOD unless given
@@ -47,21 +48,22 @@ def step(
     n, m = sum(port.size for port in state_ports), sum(port.size for port in held)
     d = sum(port.size for port in rate.outputs)
     kernel = name or f"{rate.name}_{method}"
-    program = lower_in_order(rate, [port.name for port in (*state_ports, *held, *clock)])
-    leaves, sizes = {"rate": program}, {"N": n, "M": m, "TIME": len(clock)}
-    of_rate = evaluator(program)
+    slope, of_rate = with_twin(rate, [port.name for port in (*state_ports, *held, *clock)])
+    leaves: dict[str, Leaf] = {"rate": slope}
+    sizes = {"N": n, "M": m, "TIME": len(clock)}
     if method == "lie_group":
         if move is None:
             raise InputError(f"{kernel}: the method lie_group needs `move`, which displaces a state.")
-        leaves["move"], sizes["D"] = lower_in_order(move, [port.name for port in move.inputs]), d
-        twin = twins.lie_group(n, m, of_rate, evaluator(leaves["move"]))
-        operations = 4 * program.operation_count + 5 * leaves["move"].operation_count + 20 * d
+        moved = lower_in_order(move, [port.name for port in move.inputs])
+        leaves["move"], sizes["D"] = moved, d
+        twin = twins.lie_group(n, m, of_rate, evaluator(moved))
+        operations = 4 * operation_count(slope) + 5 * moved.operation_count + 20 * d
     elif method in ("runge_kutta_4", "midpoint"):
         if d != n or move is not None:
             raise InputError(f"{kernel}: {rate.name} gives {d} rates of {n} states, without `move` they must match.")
         stages = 4 if method == "runge_kutta_4" else 2
         twin = (twins.runge_kutta_4 if method == "runge_kutta_4" else twins.midpoint)(n, m, of_rate)
-        operations = stages * (program.operation_count + 3 * n)
+        operations = stages * (operation_count(slope) + 3 * n)
     else:
         raise InputError(f"`method` must be 'runge_kutta_4', 'midpoint' or 'lie_group', got {method!r}.")
     return instantiate(

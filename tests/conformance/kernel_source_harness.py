@@ -1,6 +1,7 @@
 """Kernel sources compiled as they stand, called through ctypes, and compared with their twins to the bit."""
 
 import ctypes
+import hashlib
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
@@ -62,7 +63,9 @@ def sizes(source: KernelSource) -> tuple[int, int]:
 
 
 def unit_text(source: KernelSource) -> str:
-    return "\n".join(['#include "os_rt.h"', source.body, _CALL.format(name=source.name)])
+    headers = sorted(each.name for each in resources.files("optsat.kernels.c").iterdir() if each.name.endswith(".h"))
+    included = [f'#include "{header}"' for header in headers if "lanes" not in header]
+    return "\n".join([*included, source.body, _CALL.format(name=source.name)])
 
 
 def compile_text(text: str, path: Path, compiler: str, flags: Sequence[str]) -> None:
@@ -75,10 +78,12 @@ def compile_text(text: str, path: Path, compiler: str, flags: Sequence[str]) -> 
 def compiled(source: KernelSource, folder: Path, compiler: str = "gcc", level: str = "-O2", real: Any = float) -> Call:
     """The kernel as a function of x, strict warnings being errors."""
     single = real is np.float32
-    folder.mkdir(exist_ok=True)
-    path = folder / f"{source.name}_{compiler}{level}{'_float' if single else ''}.so"
+    text = unit_text(source)
+    # a library of the same path would be the one that is loaded already
+    key = hashlib.sha256(text.encode()).hexdigest()[:12]
+    path = folder / f"{key}_{compiler}{level}{'_float' if single else ''}.so"
     flags = [level, "-fPIC", "-shared", *(["-DOS_REAL_IS_FLOAT"] if single else [])]
-    compile_text(unit_text(source), path, compiler, flags)
+    compile_text(text, path, compiler, flags)
     function = ctypes.CDLL(str(path)).call
     k_in, k_out = sizes(source)
 

@@ -113,7 +113,6 @@ def test_it_is_the_textbook_recursion(modes: int, form: str, tmp_path: Path) -> 
 def test_twin_agrees_but_for_exponentials_and_logarithms(tmp_path: Path) -> None:
     rng = np.random.default_rng(7)
     source = make(4)
-    assert source.libm == ("exp", "log")
     assert source.twin is not None
     samples = [Bank(rng, 4).row(count) for count in (4, 4, 4, 3, 2, 1)]
     hostile = []
@@ -134,7 +133,7 @@ def test_twin_agrees_but_for_exponentials_and_logarithms(tmp_path: Path) -> None
             assert status == wanted_status
             np.testing.assert_allclose(y, wanted, rtol=1e-12, atol=1e-12)
     for a, b in zip(found[0], found[2], strict=True):
-        # one library, so one exponential: every compiler has the same bits
+        # whatever the exponential, every compiler has the same bits
         np.testing.assert_array_equal(a[1], b[1])
 
 
@@ -146,7 +145,7 @@ def test_unused_modes_pass_through_untouched(tmp_path: Path) -> None:
     five.Q, five.z = two.Q, two.z
     five.mu[:2], five.transition[:2, :2] = two.mu, two.transition
     got = split(large, compiled(large, tmp_path)(five.row(count=2))[1])
-    wanted = split(small, compiled(small, tmp_path / "two")(two.row())[1])
+    wanted = split(small, compiled(small, tmp_path)(two.row())[1])
     for name in ("x", "P", "log_probability", "failed"):
         np.testing.assert_array_equal(got[name][:2], wanted[name])
     for name in ("mean", "covariance", "log_evidence"):
@@ -184,7 +183,7 @@ def test_a_failing_mode_is_told_and_the_others_go_on(tmp_path: Path) -> None:
     rng = np.random.default_rng(10)
     for form in ("loops", "unrolled"):
         source = make(3, form)
-        call = compiled(source, tmp_path / form)
+        call = compiled(source, tmp_path)
         state = Bank(rng, 3)
         state.R[1] = -1e3
         status, y = call(state.row())

@@ -88,7 +88,7 @@ def test_error_falls_with_the_order_of_the_method(method: Method, order: int, tm
     errors = []
     for steps in (20, 40):
         source = integrate(one, STATES, steps, every=steps, held=True)
-        call = compiled(source, tmp_path / str(steps))
+        call = compiled(source, tmp_path)
         status, y = call(np.concatenate([x0, torque, [4.0 / steps]]))
         assert (status, y[-1]) == (Status.OK, steps)
         np.testing.assert_array_equal(y[:7], x0)
@@ -171,7 +171,6 @@ def test_every_form_has_the_bits_of_the_twin(method: Method, tmp_path: Path) -> 
 def test_lie_group_twin_agrees_but_for_the_sine(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     source = step(attitude_rate(), STATES, "lie_group", move=turned())
-    assert source.libm == ("cos", "sin")
     call = compiled(source, tmp_path)
     assert source.twin is not None
     for _ in range(20):

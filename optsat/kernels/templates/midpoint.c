@@ -2,11 +2,12 @@
 
 /*@sizes*/
 
-/*@leaf rate: N + M + TIME -> N */
+/*@step rate: N + M + TIME -> N */
 
 typedef struct {
     os_real_t argument[KERNEL_N + KERNEL_M + KERNEL_TIME];
     os_real_t slope[KERNEL_N];
+    KERNEL_rate_work_t rate;
 } KERNEL_work_t;
 
 /* x: state (N), inputs (M), time (TIME), dt; y: state (N) */
@@ -14,7 +15,7 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
 {
     const os_real_t dt = x[KERNEL_N + KERNEL_M + KERNEL_TIME];
     const os_real_t half = dt / (os_real_t)2;
-    KERNEL_rate_leaf(x, work->slope);
+    os_status_t status = KERNEL_rate_body(x, work->slope, &work->rate);
     for (int32_t i = 0; i < (KERNEL_N + KERNEL_M + KERNEL_TIME); ++i) {
         work->argument[i] = x[i];
     }
@@ -24,9 +25,11 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
     for (int32_t i = KERNEL_N + KERNEL_M; i < (KERNEL_N + KERNEL_M + KERNEL_TIME); ++i) {
         work->argument[i] = x[i] + half;
     }
-    KERNEL_rate_leaf(work->argument, work->slope);
-    for (int32_t i = 0; i < KERNEL_N; ++i) {
-        y[i] = x[i] + (dt * work->slope[i]);
+    if (status == OS_OK) {
+        status = KERNEL_rate_body(work->argument, work->slope, &work->rate);
     }
-    return OS_OK;
+    for (int32_t i = 0; i < KERNEL_N; ++i) {
+        y[i] = (status == OS_OK) ? (x[i] + (dt * work->slope[i])) : (os_real_t)NAN;
+    }
+    return status;
 }

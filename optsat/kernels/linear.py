@@ -1,7 +1,7 @@
 """Linear: equations and least squares of a size fixed when the kernel is built."""
 
 from optsat.kernels.instantiate import instantiate
-from optsat.kernels.sizes import LANES, check_size, padded
+from optsat.kernels.sizes import GROUP, LANES, check_size, padded
 from optsat.kernels.source import KernelSource
 from optsat.kernels.twins import cholesky_solve as cholesky_twin
 from optsat.kernels.twins import gmres as gmres_twin
@@ -31,7 +31,7 @@ def cholesky_solve(n: int, name: str = "cholesky_solve") -> KernelSource:
         "cholesky_solve",
         name,
         leaves={},
-        sizes={"N": n, "PADDED": padded(n), "LANES": LANES},
+        sizes={"N": n, "PADDED": padded(n), "LANES": LANES, "GROUP": GROUP},
         inputs=(Port("A", (n, n), "-"), Port("b", (n,), "-")),
         outputs=(Port("x", (n,), "-"), Port("pivot_ratio", (), "-")),
         twin=cholesky_twin.twin(n),
@@ -72,7 +72,7 @@ def ldl_solve(n: int, name: str = "ldl_solve") -> KernelSource:
 def recursive_least_squares(n: int, name: str = "recursive_least_squares") -> KernelSource:
     """Return the kernel that brings z = h . theta + noise into an estimate theta of n parameters.
 
-    (theta, P, h, z, variance, forgetting) -> (theta_updated, P_updated, innovation, innovation_variance)
+    (theta, P, h, z, variance, forgetting) -> (theta, P, innovation, innovation_variance)
 
     P : (n, n) covariance, symmetric, and so it stays to the bit
     variance : of the noise, positive; forgetting : in (0, 1], the weight that all older measurements lose
@@ -99,7 +99,7 @@ def recursive_least_squares(n: int, name: str = "recursive_least_squares") -> Ke
             Port("forgetting", (), "-", lower=0.0, upper=1.0),
         ),
         outputs=(
-            *(Port("theta_updated", (n,), "-"), Port("P_updated", (n, n), "-")),
+            *(theta, P),
             *(Port("innovation", (), "-"), Port("innovation_variance", (), "-")),
         ),
         twin=recursive_twin.twin(n),
@@ -128,7 +128,7 @@ def gmres(n: int, restart: int | None = None, cycles: int = 4, name: str = "gmre
         "gmres",
         name,
         leaves={},
-        sizes={"N": n, "PADDED": padded(n), "LANES": LANES, "M": m, "CYCLES": cycles},
+        sizes={"N": n, "PADDED": padded(n), "LANES": LANES, "GROUP": GROUP, "M": m, "CYCLES": cycles},
         inputs=(Port("A", (n, n), "-"), Port("b", (n,), "-"), Port("tolerance", (), "-", lower=0.0)),
         outputs=(Port("x", (n,), "-"), Port("residual", (), "-"), Port("iterations", (), "-")),
         twin=gmres_twin.twin(n, m, cycles),

@@ -5,6 +5,9 @@ from optsat.errors import InputError
 LANES = 8
 """Accumulators of every sum along a vector, whatever the width of the machine, so that its bits do not depend on it."""
 
+GROUP = 4
+"""Rows that are subtracted in one pass, a divisor of `LANES`."""
+
 
 def check_size(kernel: str, name: str, value: int, low: int, high: int) -> int:
     """Return `value`.

@@ -162,11 +162,11 @@ static inline bool os_truth(os_real_t a)
 
 static inline bool os_all_finite(const os_real_t *x, int32_t n)
 {
-    bool finite = true;
+    int32_t bad = 0;
     for (int32_t i = 0; i < n; ++i) {
-        finite = finite && (os_fabs(x[i]) <= OS_REAL_MAX);
+        bad += (os_fabs(x[i]) <= OS_REAL_MAX) ? 0 : 1;
     }
-    return finite;
+    return bad == 0;
 }
 
 #endif

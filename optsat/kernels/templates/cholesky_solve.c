@@ -3,7 +3,7 @@
 /*@sizes*/
 
 typedef struct {
-    os_real_t factor[KERNEL_N][KERNEL_PADDED];
+    os_real_t factor[KERNEL_PADDED][KERNEL_PADDED];
     os_real_t reciprocal[KERNEL_N];
     os_real_t rest[KERNEL_PADDED];
     os_real_t solution[KERNEL_PADDED];
@@ -15,30 +15,31 @@ static os_real_t KERNEL_factorise(KERNEL_work_t *work)
 {
     os_real_t least = (os_real_t)1;
     for (int32_t j = 0; (j < KERNEL_N) && (least > (os_real_t)0); ++j) {
-        os_real_t *row = work->factor[j];
-        const os_real_t diagonal = row[j];
-        for (int32_t begin = j - (j % KERNEL_LANES); begin < KERNEL_PADDED; begin += KERNEL_LANES) {
-            os_real_t rest[KERNEL_LANES];
-            for (int32_t lane = 0; lane < KERNEL_LANES; ++lane) {
-                rest[lane] = row[begin + lane];
+        os_real_t rest[KERNEL_PADDED];
+        for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
+            rest[i] = work->factor[j][i];
+        }
+        const os_real_t diagonal = rest[j];
+        for (int32_t first = 0; first < j; first += KERNEL_GROUP) {
+            /* several rows in one pass, those from j on times zero */
+            os_real_t factor[KERNEL_GROUP];
+            for (int32_t k = 0; k < KERNEL_GROUP; ++k) {
+                factor[k] = ((first + k) < j) ? work->factor[first + k][j] : (os_real_t)0;
             }
-            for (int32_t k = 0; k < j; ++k) {
-                const os_real_t *above = &work->factor[k][begin];
-                const os_real_t factor = work->factor[k][j];
-                for (int32_t lane = 0; lane < KERNEL_LANES; ++lane) {
-                    rest[lane] -= above[lane] * factor;
-                }
-            }
-            for (int32_t lane = 0; lane < KERNEL_LANES; ++lane) {
-                row[begin + lane] = rest[lane];
+            for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
+                rest[i] = (((rest[i] - (work->factor[first][i] * factor[0])) - (work->factor[first + 1][i] * factor[1]))
+                           - (work->factor[first + 2][i] * factor[2])) - (work->factor[first + 3][i] * factor[3]);
             }
         }
-        const os_real_t pivot = row[j];
+        const os_real_t pivot = rest[j];
         const bool usable = (pivot > (((os_real_t)KERNEL_N * OS_EPSILON) * diagonal)) && (pivot <= OS_REAL_MAX);
         least = usable ? os_fmin(least, pivot / diagonal) : (os_real_t)0;
         work->reciprocal[j] = (os_real_t)1 / os_sqrt(usable ? pivot : (os_real_t)1);
         for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
-            row[i] = (i < j) ? (os_real_t)0 : (row[i] * work->reciprocal[j]);
+            work->factor[j][i] = rest[i] * work->reciprocal[j];
+        }
+        for (int32_t i = 0; i < j; ++i) {
+            work->factor[j][i] = (os_real_t)0;
         }
     }
     return least;
@@ -50,10 +51,9 @@ static void KERNEL_substitute(KERNEL_work_t *work)
         work->solution[k] = (os_real_t)0;
     }
     for (int32_t k = 0; k < KERNEL_N; ++k) {
-        const os_real_t *row = work->factor[k];
         const os_real_t forward = work->rest[k] * work->reciprocal[k];
         for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
-            work->rest[i] -= row[i] * forward;
+            work->rest[i] -= work->factor[k][i] * forward;
         }
         work->rest[k] = forward;
     }
@@ -67,9 +67,9 @@ static void KERNEL_substitute(KERNEL_work_t *work)
 static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *work)
 {
     os_status_t status = OS_OK;
-    for (int32_t i = 0; i < KERNEL_N; ++i) {
+    for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
         for (int32_t j = 0; j < KERNEL_PADDED; ++j) {
-            work->factor[i][j] = (j < KERNEL_N) ? x[(i * KERNEL_N) + j] : (os_real_t)0;
+            work->factor[i][j] = ((i < KERNEL_N) && (j < KERNEL_N)) ? x[(i * KERNEL_N) + j] : (os_real_t)0;
         }
     }
     for (int32_t j = 0; j < KERNEL_PADDED; ++j) {

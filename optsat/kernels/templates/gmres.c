@@ -3,9 +3,9 @@
 /*@sizes*/
 
 typedef struct {
-    os_real_t columns[KERNEL_N][KERNEL_PADDED];
-    os_real_t basis[KERNEL_M + 1][KERNEL_PADDED];
-    os_real_t triangle[KERNEL_M][KERNEL_M];
+    os_real_t columns[KERNEL_PADDED][KERNEL_PADDED];
+    os_real_t basis[KERNEL_M + KERNEL_GROUP][KERNEL_PADDED];
+    os_real_t triangle[KERNEL_M][KERNEL_M + KERNEL_GROUP];
     os_real_t cosine[KERNEL_M];
     os_real_t sine[KERNEL_M];
     os_real_t reduced[KERNEL_M + 1];
@@ -32,16 +32,17 @@ static os_real_t KERNEL_length(const os_real_t *a, os_real_t *scaled)
 
 static void KERNEL_multiply(const KERNEL_work_t *work, const os_real_t *factor, os_real_t *product)
 {
-    for (int32_t begin = 0; begin < KERNEL_PADDED; begin += KERNEL_LANES) {
-        os_real_t sum[KERNEL_LANES] = { (os_real_t)0 };
-        for (int32_t k = 0; k < KERNEL_N; ++k) {
-            for (int32_t lane = 0; lane < KERNEL_LANES; ++lane) {
-                sum[lane] += work->columns[k][begin + lane] * factor[k];
-            }
+    os_real_t sum[KERNEL_PADDED] = { (os_real_t)0 };
+    for (int32_t first = 0; first < KERNEL_PADDED; first += KERNEL_GROUP) {
+        for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
+            sum[i] = (((sum[i] + (work->columns[first][i] * factor[first]))
+                       + (work->columns[first + 1][i] * factor[first + 1]))
+                      + (work->columns[first + 2][i] * factor[first + 2]))
+                     + (work->columns[first + 3][i] * factor[first + 3]);
         }
-        for (int32_t lane = 0; lane < KERNEL_LANES; ++lane) {
-            product[begin + lane] = sum[lane];
-        }
+    }
+    for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
+        product[i] = sum[i];
     }
 }
 
@@ -53,19 +54,23 @@ static void KERNEL_find_rest(KERNEL_work_t *work)
     }
 }
 
-/* Extend the basis by A times its vector j, orthogonal to the others; false where nothing new is left to add. */
+/* Extend the basis by A times its vector j, orthogonal to the others; false where nothing new is left to add.
+   Vectors are taken off in groups, the basis beyond j being zero. */
 static bool KERNEL_extend(KERNEL_work_t *work, int32_t j)
 {
-    os_real_t *fresh = work->basis[j + 1];
+    os_real_t fresh[KERNEL_PADDED];
     os_real_t *column = work->triangle[j];
     KERNEL_multiply(work, work->basis[j], fresh);
     const os_real_t before = os_sqrt(KERNEL_dot(fresh, fresh));
-    for (int32_t i = 0; i <= j; ++i) {
-        const os_real_t *known = work->basis[i];
-        const os_real_t along = KERNEL_dot(fresh, known);
-        column[i] = along;
+    for (int32_t first = 0; first <= j; first += KERNEL_GROUP) {
+        for (int32_t i = 0; i < KERNEL_GROUP; ++i) {
+            column[first + i] = KERNEL_dot(fresh, work->basis[first + i]);
+        }
         for (int32_t k = 0; k < KERNEL_PADDED; ++k) {
-            fresh[k] -= known[k] * along;
+            fresh[k] = (((fresh[k] - (work->basis[first][k] * column[first]))
+                         - (work->basis[first + 1][k] * column[first + 1]))
+                        - (work->basis[first + 2][k] * column[first + 2]))
+                       - (work->basis[first + 3][k] * column[first + 3]);
         }
     }
     const os_real_t below = os_sqrt(KERNEL_dot(fresh, fresh));
@@ -84,7 +89,7 @@ static bool KERNEL_extend(KERNEL_work_t *work, int32_t j)
         work->reduced[j] = work->cosine[j] * work->reduced[j];
         const os_real_t scale = (os_real_t)1 / ((below > (os_real_t)0) ? below : (os_real_t)1);
         for (int32_t k = 0; k < KERNEL_PADDED; ++k) {
-            fresh[k] *= scale;
+            work->basis[j + 1][k] = fresh[k] * scale;
         }
     }
     return usable;
@@ -95,8 +100,10 @@ static int32_t KERNEL_cycle(KERNEL_work_t *work, os_real_t length, os_real_t eno
 {
     int32_t used = 0;
     bool more = true;
-    for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
-        work->basis[0][i] = work->rest[i] / length;
+    for (int32_t j = 0; j < (KERNEL_M + KERNEL_GROUP); ++j) {
+        for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
+            work->basis[j][i] = (j == 0) ? (work->rest[i] / length) : (os_real_t)0;
+        }
     }
     work->reduced[0] = length;
     for (int32_t j = 0; (j < KERNEL_M) && more; ++j) {
@@ -123,9 +130,9 @@ static int32_t KERNEL_cycle(KERNEL_work_t *work, os_real_t length, os_real_t eno
 static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *work)
 {
     const os_real_t tolerance = x[KERNEL_N * (KERNEL_N + 1)];
-    for (int32_t k = 0; k < KERNEL_N; ++k) {
+    for (int32_t k = 0; k < KERNEL_PADDED; ++k) {
         for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
-            work->columns[k][i] = (i < KERNEL_N) ? x[(i * KERNEL_N) + k] : (os_real_t)0;
+            work->columns[k][i] = ((i < KERNEL_N) && (k < KERNEL_N)) ? x[(i * KERNEL_N) + k] : (os_real_t)0;
         }
     }
     for (int32_t i = 0; i < KERNEL_PADDED; ++i) {

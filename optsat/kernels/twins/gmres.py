@@ -3,7 +3,7 @@
 import numpy as np
 
 from optsat.arrays import Array
-from optsat.kernels.sizes import padded
+from optsat.kernels.sizes import GROUP, padded
 from optsat.kernels.source import Twin
 from optsat.kernels.status import Status
 from optsat.kernels.twins.lane_sums import dot, largest
@@ -15,11 +15,11 @@ def twin(n: int, m: int, cycles: int) -> Twin:
     """Return x of A x = b, |b - A x| / |b|, and the iterations."""
 
     def run(x: Array) -> tuple[int, Array]:
-        columns, given = np.zeros((n, padded(n))), np.zeros(padded(n))
-        columns[:, :n] = x[: n * n].reshape(n, n).T
+        columns, given = np.zeros((padded(n), padded(n))), np.zeros(padded(n))
+        columns[:n, :n] = x[: n * n].reshape(n, n).T
         given[:n] = x[n * n : -1]
         with np.errstate(all="ignore"):
-            best, residual, iterations = _solve(columns, given, float(x[-1]), m, cycles)
+            best, residual, iterations = _solve(columns, given, float(x[-1]), (n, m, cycles))
         status = Status.OK if residual <= x[-1] else Status.NOT_CONVERGED
         if not np.isfinite(x).all():
             status = Status.NOT_FINITE
@@ -35,7 +35,8 @@ def twin(n: int, m: int, cycles: int) -> Twin:
     return run
 
 
-def _solve(columns: Array, given: Array, tolerance: float, m: int, cycles: int) -> tuple[Array, float, int]:
+def _solve(columns: Array, given: Array, tolerance: float, sizes: tuple[int, int, int]) -> tuple[Array, float, int]:
+    n, m, cycles = sizes
     point, best = np.zeros_like(given), np.zeros_like(given)
     length = _length(given)
     whole = length if length > 0.0 else 1.0
@@ -43,7 +44,7 @@ def _solve(columns: Array, given: Array, tolerance: float, m: int, cycles: int) 
     for _ in range(cycles):
         if not (residual > tolerance and length <= np.finfo(float).max):
             break
-        correction, used = _cycle(columns, rest, length, tolerance * whole, m)
+        correction, used = _cycle(columns, rest, length, tolerance * whole, n, m)
         for term in correction:
             point = point + term
         iterations += used
@@ -55,24 +56,30 @@ def _solve(columns: Array, given: Array, tolerance: float, m: int, cycles: int) 
     return best, residual, iterations
 
 
-def _cycle(columns: Array, rest: Array, length: float, enough: float, m: int) -> tuple[list[Array], int]:
+def _cycle(columns: Array, rest: Array, length: float, enough: float, n: int, m: int) -> tuple[list[Array], int]:
     basis, reduced = [rest / length], [length]
     triangle: list[list[float]] = []
     rotations: list[tuple[float, float]] = []
     for _ in range(m):
         fresh = _multiply(columns, basis[-1])
         before = np.sqrt(dot(fresh, fresh))
-        column = []
-        for known in basis:
-            column.append(dot(fresh, known))
-            fresh = fresh - known * column[-1]
+        column: list[float] = []
+        for first in range(0, len(basis), GROUP):
+            group = basis[first : first + GROUP]
+            along = [dot(fresh, known) for known in group]
+            column += along
+            for known, each in zip(group, along, strict=True):
+                fresh = fresh - known * each
+            # beyond the basis there are zeros
+            for _ in range(GROUP - len(group)):
+                fresh = fresh - 0.0 * dot(fresh, np.zeros_like(fresh))
         below = np.sqrt(dot(fresh, fresh))
         for i, (cosine, sine) in enumerate(rotations):
             upper = cosine * column[i] + sine * column[i + 1]
             column[i + 1] = cosine * column[i + 1] - sine * column[i]
             column[i] = upper
         radius = np.sqrt(column[-1] * column[-1] + below * below)
-        if not radius > (len(columns) * _EPSILON) * before:
+        if not radius > (n * _EPSILON) * before:
             break
         rotations.append((column[-1] / radius, below / radius))
         column[-1] = radius
@@ -92,7 +99,7 @@ def _cycle(columns: Array, rest: Array, length: float, enough: float, m: int) ->
 
 def _multiply(columns: Array, factor: Array) -> Array:
     product = np.zeros(columns.shape[1])
-    for column, each in zip(columns, factor, strict=False):
+    for column, each in zip(columns, factor, strict=True):
         product = product + column * each
     return product
 

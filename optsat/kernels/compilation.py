@@ -45,7 +45,8 @@ def compiled(
     """
     compiler = compiler or find_compiler()
     found = fingerprint(compiler).checked()
-    optimisation = "-O2" if record.operations <= LARGE else "-O1"
+    # what has a status stands in loops: many operations, but little text
+    optimisation = "-O2" if record.has_status or record.operations <= LARGE else "-O1"
     # "native" is no name of a processor: the target stands for it
     flags = (optimisation, *(f for f in found.flags if not f.endswith("=native")), *extra, *compiler.flags, *KEEP_BITS)
     width = _WIDTH.search(text)

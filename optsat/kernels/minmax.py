@@ -69,8 +69,10 @@ def minmax(
     m = check_size(name, "number of objectives", F.numel(), 1, LARGEST)
     for i in absolute:
         check_size(name, "absolute index", i, 0, m - 1)
+    if residuals and len(residuals) != m:
+        raise InputError(f"{name}: `residuals` must hold one vector for each of {m} objectives, got {len(residuals)}.")
     goals, weights = ca.SX.sym("goals", m), ca.SX.sym("weights", m)
-    row_sizes = ca.fabs(ca.vertcat(weights, *(weights[i] for i in absolute), ca.SX(g.numel(), 1)))
+    widths = ca.fabs(ca.vertcat(weights, *(weights[i] for i in absolute), ca.SX(g.numel(), 1)))
     downward = ca.if_else(weights < 0, -1, 1)
     from_goal = downward * (F - goals)
     rows = ca.vertcat(from_goal, *(-from_goal[i] for i in absolute), g)
@@ -79,16 +81,17 @@ def minmax(
     signs = downward * multipliers[:m]
     for k, i in enumerate(absolute):
         signs[i] -= downward[i] * multipliers[m + k]
+    sizes = Sizes(n, rows.numel(), sum(each.numel() for each in given))
+    weighted = ca.vertcat(signs, multipliers[-g.numel() :] if g.numel() else ca.SX(0, 1))
     derivatives = [
-        _derivatives(name, rows, x, multipliers, curvature, [x, *given, multipliers])
-        for curvature in _curvatures(name, rows, x, multipliers, signs, residuals, m)
+        _derivatives(rows, x, widths, curvature, sizes.padded, [x, *given, multipliers], name)
+        for curvature in _curvatures(ca.vertcat(F, g), x, weighted, residuals, name)
     ]
     leaves = {
         "rows": _leaf("rows", name, [x, *given], [rows]),
         "derivatives": min(derivatives, key=lambda program: program.operation_count),
-        "widths": _leaf("widths", name, given, [row_sizes]),
+        "widths": _leaf("widths", name, given, [widths]),
     }
-    sizes = Sizes(n, rows.numel(), sum(each.numel() for each in given))
     return instantiate(
         "minmax",
         name,
@@ -113,30 +116,33 @@ def minmax(
     )
 
 
-def _curvatures(
-    name: str, rows: Any, x: Any, multipliers: Any, signs: Any, residuals: Sequence[Any], objectives: int
-) -> list[Any]:
-    """Return the Hessian of the Lagrangian in each way worth a try: which takes the fewest operations depends on F."""
+def _curvatures(functions: Any, x: Any, weights: Any, residuals: Sequence[Any], name: str) -> list[Any]:
+    """Return the Hessian of the weighted sum in each way worth a try: which takes the fewest operations depends on it.
+
+    With residuals, that of Gauss and Newton.
+    """
     import casadi as ca
 
     if not residuals:
-        of_sum = ca.hessian(ca.dot(multipliers, rows), x)[0]
-        return [of_sum, ca.jacobian(ca.jacobian(rows, x).T @ multipliers, x)]
-    if len(residuals) != objectives:
-        raise InputError(f"{name}: `residuals` must hold one vector for each of {objectives} objectives.")
+        of_sum = ca.hessian(ca.dot(weights, functions), x)[0]
+        return [of_sum, ca.jacobian(ca.jacobian(functions, x).T @ weights, x)]
     total = ca.SX(x.numel(), x.numel())
     for i, residual in enumerate(residuals):
         jacobian = ca.jacobian(ca.vec(residual), x)
-        total += signs[i] * (jacobian.T @ jacobian)
+        total += weights[i] * (jacobian.T @ jacobian)
     return [total]
 
 
-def _derivatives(name: str, rows: Any, x: Any, multipliers: Any, curvature: Any, arguments: list[Any]) -> Program:
+def _derivatives(
+    rows: Any, x: Any, widths: Any, curvature: Any, padded: int, arguments: list[Any], name: str
+) -> Program:
+    """Return values, gradients and Hessian in the layout of the template."""
     import casadi as ca
 
     n = x.numel()
-    triangle = ca.vertcat(*(curvature[j, k] for j in range(n) for k in range(j + 1)))
-    results: list[Any] = list(ca.cse([rows, ca.jacobian(rows, x), triangle]))
+    gradients = ca.horzcat(ca.jacobian(rows, x), -widths, ca.SX(rows.numel(), padded - n - 1))
+    hessian = ca.diagcat(curvature, ca.SX(1, padded - n))
+    results: list[Any] = list(ca.cse([rows, gradients, hessian]))
     return _leaf("derivatives", name, arguments, results)
 
 

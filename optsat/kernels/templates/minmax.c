@@ -13,27 +13,33 @@ typedef struct {
 } KERNEL_point_t;
 
 typedef struct {
-    os_real_t v[KERNEL_V];
+    os_real_t v[KERNEL_PADDED];
     os_real_t slack[KERNEL_PAIRS];
     os_real_t multiplier[KERNEL_PAIRS];
 } KERNEL_step_t;
 
-/* Pairs: the rows, the lower bounds, the upper bounds. */
+/* Pairs: the rows, the lower bounds, the upper bounds. Of x and gamma together there are V, in rows of length PADDED.
+   derivative: values of the rows, their gradients (each followed by -width and padding), Hessian of their sum weighted
+   by the multipliers. */
 typedef struct {
     os_real_t argument[KERNEL_N + KERNEL_PARAMETERS + KERNEL_ROWS];
-    os_real_t derivative[KERNEL_ROWS + (KERNEL_ROWS * KERNEL_N) + KERNEL_HESSIAN];
+    os_real_t derivative[KERNEL_ROWS + ((KERNEL_ROWS + KERNEL_V) * KERNEL_PADDED)];
     os_real_t width[KERNEL_ROWS];
     os_real_t lower[KERNEL_N];
     os_real_t upper[KERNEL_N];
     os_real_t multiplier[KERNEL_PAIRS];
     os_real_t product[KERNEL_PAIRS];
     os_real_t change[KERNEL_PAIRS];
-    os_real_t gradient[KERNEL_N];
-    os_real_t dual_residual[KERNEL_V];
+    os_real_t gradient[KERNEL_PADDED];
+    os_real_t dual_residual[KERNEL_PADDED];
     os_real_t row_residual[KERNEL_ROWS];
-    os_real_t matrix[KERNEL_TRIANGLE];
-    os_real_t factor[KERNEL_TRIANGLE];
-    os_real_t reciprocal[KERNEL_V];
+    os_real_t inverse[KERNEL_PAIRS];
+    os_real_t matrix[KERNEL_V][KERNEL_PADDED];
+    os_real_t rest[KERNEL_V][KERNEL_PADDED];
+    os_real_t by_rows[KERNEL_V][KERNEL_PADDED];
+    os_real_t by_columns[KERNEL_V][KERNEL_PADDED];
+    os_real_t diagonal[KERNEL_V];
+    os_real_t reciprocal[KERNEL_PADDED];
     os_real_t best_x[KERNEL_N];
     os_real_t best_gamma;
     os_real_t best_violation;
@@ -55,7 +61,7 @@ typedef struct {
 } KERNEL_work_t;
 
 /*@leaf rows: N + PARAMETERS -> ROWS */
-/*@leaf derivatives: N + PARAMETERS + ROWS -> ROWS + ROWS * N + HESSIAN */
+/*@leaf derivatives: N + PARAMETERS + ROWS -> ROWS + ROWS * PADDED + V * PADDED */
 /*@leaf widths: PARAMETERS -> ROWS */
 /*@include minmax_factor*/
 /*@include minmax_merit*/
@@ -175,7 +181,7 @@ static os_real_t KERNEL_verify(KERNEL_work_t *work)
         gap += work->product[p];
     }
     residual = os_fmax(gap / ((os_real_t)1 + os_fabs(now->gamma)), residual);
-    const bool known = os_all_finite(work->derivative, KERNEL_ROWS * (KERNEL_N + 1)) && (residual <= OS_REAL_MAX);
+    const bool known = os_all_finite(work->derivative, KERNEL_ROWS * (KERNEL_PADDED + 1)) && (residual <= OS_REAL_MAX);
     return known ? residual : OS_REAL_MAX;
 }
 

@@ -14,21 +14,20 @@ static os_real_t KERNEL_smoothed(const KERNEL_work_t *work, const KERNEL_point_t
 static void KERNEL_linearise(KERNEL_work_t *work, os_real_t smoothing)
 {
     KERNEL_residuals(work);
-    for (int32_t k = 0; k < KERNEL_TRIANGLE; ++k) {
-        work->matrix[k] = (os_real_t)0;
-    }
     os_real_t *gradient = work->second.v;
-    for (int32_t j = 0; j < KERNEL_V; ++j) {
+    for (int32_t j = 0; j < KERNEL_PADDED; ++j) {
+        for (int32_t k = 0; k < KERNEL_V; ++k) {
+            work->matrix[k][j] = (os_real_t)0;
+        }
         gradient[j] = (j == KERNEL_N) ? (os_real_t)1 : (os_real_t)0;
     }
     for (int32_t i = 0; i < KERNEL_ROWS; ++i) {
         const os_real_t excess = work->derivative[i] - (work->width[i] * work->now.gamma);
         if (excess > (os_real_t)0) {
             const os_real_t force = excess / smoothing;
-            for (int32_t j = 0; j < KERNEL_N; ++j) {
-                gradient[j] += force * work->derivative[KERNEL_ROWS + (i * KERNEL_N) + j];
+            for (int32_t j = 0; j < KERNEL_V; ++j) {
+                gradient[j] += force * work->derivative[KERNEL_ROWS + (i * KERNEL_PADDED) + j];
             }
-            gradient[KERNEL_N] -= force * work->width[i];
             KERNEL_add_row(work, i, (os_real_t)1 / smoothing);
         }
     }
@@ -47,7 +46,7 @@ static bool KERNEL_descend(KERNEL_work_t *work, os_real_t smoothing, os_real_t d
     KERNEL_point_t *trial = &work->trial;
     bool improved = KERNEL_factor(work, damping);
     if (improved) {
-        for (int32_t j = 0; j < KERNEL_V; ++j) {
+        for (int32_t j = 0; j < KERNEL_PADDED; ++j) {
             work->step.v[j] = -work->second.v[j];
         }
         KERNEL_solve(work, work->step.v);

@@ -5,10 +5,9 @@
 static os_real_t KERNEL_predict(KERNEL_work_t *work, os_real_t mu, os_real_t least)
 {
     KERNEL_step_t *step = &work->step;
-    os_real_t primal;
-    os_real_t dual;
     KERNEL_direction(work, work->row_residual, work->product, step);
-    KERNEL_lengths(work, step, (os_real_t)1, &primal, &dual);
+    const os_real_t primal = KERNEL_length(work->now.slack, step->slack, (os_real_t)1);
+    const os_real_t dual = KERNEL_length(work->multiplier, step->multiplier, (os_real_t)1);
     os_real_t left = (os_real_t)0;
     for (int32_t p = 0; p < KERNEL_PAIRS; ++p) {
         const os_real_t slack = work->now.slack[p] + (primal * step->slack[p]);

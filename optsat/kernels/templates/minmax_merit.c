@@ -66,7 +66,7 @@ static os_real_t KERNEL_slope(const KERNEL_work_t *work, const KERNEL_step_t *st
 {
     os_real_t barrier = (os_real_t)0;
     for (int32_t p = 0; p < KERNEL_PAIRS; ++p) {
-        barrier += step->slack[p] / work->now.slack[p];
+        barrier += step->slack[p] * work->inverse[p];
     }
     return (step->v[KERNEL_N] - (mu * barrier)) - (work->penalty * work->now.misfit);
 }

@@ -82,9 +82,8 @@ static bool KERNEL_search(KERNEL_work_t *work, os_real_t mu)
 {
     const KERNEL_step_t *step = &work->step;
     const os_real_t share = os_fmax((os_real_t)0.99, (os_real_t)1 - mu);
-    os_real_t length;
-    os_real_t dual;
-    KERNEL_lengths(work, step, share, &length, &dual);
+    os_real_t length = KERNEL_length(work->now.slack, step->slack, share);
+    const os_real_t dual = KERNEL_length(work->multiplier, step->multiplier, share);
     os_real_t largest = (os_real_t)0;
     for (int32_t i = 0; i < KERNEL_ROWS; ++i) {
         largest = os_fmax(os_fabs(work->multiplier[i] + step->multiplier[i]), largest);
@@ -104,14 +103,13 @@ static bool KERNEL_search(KERNEL_work_t *work, os_real_t mu)
             if (accepted) {
                 KERNEL_accept(work, step, dual);
             } else if ((k == 0) && usable && (work->trial.misfit >= work->now.misfit)) {
-                os_real_t second;
-                os_real_t second_dual;
                 KERNEL_second_order(work, length, mu);
-                KERNEL_lengths(work, &work->second, share, &second, &second_dual);
+                const os_real_t second = KERNEL_length(work->now.slack, work->second.slack, share);
                 accepted = KERNEL_try(work, &work->second, second, mu) &&
                            KERNEL_descends(work, mu, merit + rounding, second * slope);
                 if (accepted) {
-                    KERNEL_accept(work, &work->second, second_dual);
+                    KERNEL_accept(work, &work->second,
+                                  KERNEL_length(work->multiplier, work->second.multiplier, share));
                 }
             } else {
                 /* the halved step is next */

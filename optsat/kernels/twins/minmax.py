@@ -15,7 +15,7 @@ from optsat.kernels.twins.minmax_step import (
     direction,
     factorise,
     freeze,
-    lengths,
+    length_of,
     prepare,
     solve,
     take_residuals,
@@ -124,7 +124,7 @@ def _verify(work: MinmaxWork) -> float:
     gap = ordered_sum(np.abs(work.multiplier[:rows] * work.fitting(now)))
     gap = ordered_sum(work.product[rows:], gap)
     residual = float(fmax(gap / (1.0 + abs(now.gamma)), residual))
-    known = np.isfinite(work.value).all() and np.isfinite(work.jacobian).all() and residual <= LARGEST
+    known = np.isfinite(work.value).all() and np.isfinite(work.row).all() and residual <= LARGEST
     return residual if known else LARGEST
 
 
@@ -155,7 +155,8 @@ def _iterate(work: MinmaxWork) -> None:
 
 def _predict(work: MinmaxWork, mu: float, least: float) -> tuple[MinmaxStep, float]:
     step = direction(work, work.row_residual, work.product)
-    primal, dual = lengths(work, step, 1.0)
+    primal = length_of(work.now.slack, step.slack, 1.0)
+    dual = length_of(work.multiplier, step.multiplier, 1.0)
     slack, multiplier = work.now.slack + primal * step.slack, work.multiplier + dual * step.multiplier
     left = ordered_sum(slack * multiplier)
     ratio = float(fmin(fmax(left / work.gap, 0.0), 1.0))
@@ -220,8 +221,7 @@ def _linearise(work: MinmaxWork, smoothing: float) -> Array:
     excess = work.value - work.width * now.gamma
     for i in np.flatnonzero(excess > 0.0):
         force = excess[i] / smoothing
-        gradient[:n] += force * work.jacobian[i]
-        gradient[n] -= force * work.width[i]
+        gradient += force * work.row[i]
         add_row(work, int(i), 1.0 / smoothing)
     low = (now.x <= work.lower) & (gradient[:n] > 0.0)
     high = (now.x >= work.upper) & (gradient[:n] < 0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from optsat.arrays import Array
-from optsat.kernels.twins.minmax_step import direction, lengths
+from optsat.kernels.twins.minmax_step import direction, length_of
 from optsat.kernels.twins.minmax_work import (
     EPSILON,
     LARGEST,
@@ -80,12 +80,13 @@ def search(work: MinmaxWork, step: MinmaxStep, mu: float) -> bool:
     """Go along the step by Armijo's rule, with one correction of second order and at most 12 halvings."""
     rows, now = work.sizes.rows, work.now
     share = max(0.99, 1.0 - mu)
-    length, dual = lengths(work, step, share)
+    length = length_of(now.slack, step.slack, share)
+    dual = length_of(work.multiplier, step.multiplier, share)
     most = largest_of(np.abs(work.multiplier[:rows] + step.multiplier[:rows]), 0.0)
     if work.penalty < 1.1 * most:
         work.penalty = 1.5 * most
     before = merit(work, now, mu)
-    slope = (step.v[-1] - mu * ordered_sum(step.slack / now.slack)) - work.penalty * now.misfit
+    slope = (step.v[-1] - mu * ordered_sum(step.slack * work.inverse)) - work.penalty * now.misfit
     rounding = (10.0 * EPSILON) * abs(before)
     if not slope <= rounding:
         return False
@@ -96,9 +97,9 @@ def search(work: MinmaxWork, step: MinmaxStep, mu: float) -> bool:
             return True
         if k == 0 and usable and work.trial.misfit >= now.misfit:
             second = _second_order(work, step, length, mu)
-            longest, dual_second = lengths(work, second, share)
+            longest = length_of(now.slack, second.slack, share)
             if _try(work, second, longest, mu) and _descends(work, mu, before + rounding, longest * slope):
-                _accept(work, second, dual_second)
+                _accept(work, second, length_of(work.multiplier, second.multiplier, share))
                 return True
         length *= 0.5
     return False

@@ -11,17 +11,18 @@ def take_residuals(work: MinmaxWork) -> None:
     n, rows, now = work.sizes.unknowns, work.sizes.rows, work.now
     derivative = work.derivatives_leaf(np.concatenate([now.x, work.parameters, work.multiplier[:rows]]))
     work.value = derivative[:rows]
-    work.jacobian = derivative[rows : rows + rows * n].reshape(rows, n)
-    work.hessian = derivative[rows + rows * n :]
-    work.gradient, scale = np.zeros(n), np.ones(n)
+    matrices = derivative[rows:].reshape(-1, work.sizes.padded)[:, : n + 1]
+    work.row, work.hessian = matrices[:rows], matrices[rows:]
+    gradient, scale = np.zeros(n + 1), np.ones(n + 1)
     for i in range(rows):
-        term = work.multiplier[i] * work.jacobian[i]
-        work.gradient = work.gradient + term
+        term = work.multiplier[i] * work.row[i]
+        gradient = gradient + term
         scale = scale + np.abs(term)
-    free = (work.gradient - work.multiplier[rows : rows + n]) + work.multiplier[rows + n :]
-    rest = ordered_sum(-(work.width * work.multiplier[:rows]), 1.0)
-    work.dual_residual = np.append(np.where(work.fixed, 0.0, free), rest)
-    work.dual_error = largest_of(np.abs(work.dual_residual) / np.append(scale, 1.0), 0.0)
+    gradient[n] += 1.0
+    work.gradient = gradient[:n]
+    pull = work.multiplier[rows : rows + n] - work.multiplier[rows + n :]
+    work.dual_residual = np.append(np.where(work.fixed, 0.0, work.gradient - pull), gradient[n])
+    work.dual_error = largest_of(np.abs(work.dual_residual) / np.append(scale[:n], 1.0), 0.0)
     work.row_residual = (work.value - work.width * now.gamma) + now.slack[:rows]
     sizes = 1.0 + np.abs(work.value)
     work.row_error = largest_of(np.abs(work.row_residual) / sizes, 0.0)
@@ -35,9 +36,9 @@ def take_residuals(work: MinmaxWork) -> None:
 def prepare(work: MinmaxWork) -> bool:
     """Form the matrix of the step in x and gamma, damped until its inertia is right."""
     n, rows = work.sizes.unknowns, work.sizes.rows
-    work.matrix = np.zeros((n + 1, n + 1))
-    work.matrix[np.tril_indices(n)] = work.hessian
-    ratio = work.multiplier / work.now.slack
+    work.matrix = work.hessian.copy()
+    work.inverse = 1.0 / work.now.slack
+    ratio = work.multiplier * work.inverse
     for i in range(rows):
         add_row(work, i, ratio[i])
     for j in range(n):
@@ -60,11 +61,7 @@ def prepare(work: MinmaxWork) -> bool:
 
 def add_row(work: MinmaxWork, i: int, d: float) -> None:
     """Add d a a' over the row a = (gradient of row i, -width) to the matrix."""
-    gradient, n = work.jacobian[i], work.sizes.unknowns
-    width = d * work.width[i]
-    work.matrix[:n, :n] += np.outer(d * gradient, gradient)
-    work.matrix[n, :n] -= width * gradient
-    work.matrix[n, n] += width * work.width[i]
+    work.matrix += np.outer(d * work.row[i], work.row[i])
 
 
 def freeze(work: MinmaxWork, j: int) -> None:
@@ -87,47 +84,44 @@ def factorise(work: MinmaxWork, damping: float) -> bool:
         rest = factor[k + 1 :, k].copy()
         factor[k + 1 :, k] = rest * reciprocal[k]
         factor[k + 1 :, k + 1 :] -= np.outer(rest, factor[k + 1 :, k])
-    work.factor, work.reciprocal = factor, reciprocal
+    work.factor, work.reciprocal = np.tril(factor, -1), reciprocal
     return True
 
 
 def solve(work: MinmaxWork, b: Array) -> Array:
-    """Return the solution."""
+    """Return the solution; all entries take part in each step, those above the diagonal with a factor of zero."""
     x = b.copy()
     for k in range(len(x)):
-        x[k + 1 :] -= work.factor[k + 1 :, k] * x[k]
+        x -= work.factor[:, k] * x[k]
     x *= work.reciprocal
-    for i in reversed(range(len(x))):
-        x[:i] -= work.factor[i, :i] * x[i]
+    for k in reversed(range(len(x))):
+        x -= work.factor[k] * x[k]
     return x
 
 
 def direction(work: MinmaxWork, misfit: Array, product: Array) -> MinmaxStep:
     """Return the step that takes the misfits of the rows to zero, and the products of the pairs down by `product`."""
-    n, rows, slack = work.sizes.unknowns, work.sizes.rows, work.now.slack
+    n, rows = work.sizes.unknowns, work.sizes.rows
     v = -work.dual_residual
     for i in range(rows):
-        force = (work.multiplier[i] * misfit[i] - product[i]) / slack[i]
-        v[:n] -= work.jacobian[i] * force
-        v[n] += work.width[i] * force
-    pull = np.where(work.present[rows:], product[rows:] / slack[rows:], 0.0)
+        v -= work.row[i] * ((work.multiplier[i] * misfit[i] - product[i]) * work.inverse[i])
+    pull = np.where(work.present[rows:], product[rows:] * work.inverse[rows:], 0.0)
     v[:n] -= pull[:n]
     v[:n] += pull[n:]
     v[:n] = np.where(work.fixed, 0.0, v[:n])
     v = solve(work, v)
     change = np.zeros(rows)
-    for j in range(n):
-        change = change + work.jacobian[:, j] * v[j]
-    change = np.concatenate([-misfit - (change - work.width * v[n]), v[:n], -v[:n]])
-    change = np.where(work.present, change, 0.0)
-    multiplier = np.where(work.present, (-product - work.multiplier * change) / slack, 0.0)
-    return MinmaxStep(v, change, multiplier)
+    for j in range(n + 1):
+        change = change + work.row[:, j] * v[j]
+    slack = np.where(work.present, np.concatenate([-misfit - change, v[:n], -v[:n]]), 0.0)
+    multiplier = np.where(work.present, (-product - work.multiplier * slack) * work.inverse, 0.0)
+    return MinmaxStep(v, slack, multiplier)
 
 
-def lengths(work: MinmaxWork, step: MinmaxStep, share: float) -> tuple[float, float]:
-    """Return the longest steps, at most 1, that leave each slack and each multiplier 1 - share of itself."""
-    found = []
-    for value, change in ((work.now.slack, step.slack), (work.multiplier, step.multiplier)):
-        falling = change < 0.0
-        found.append(-largest_of(share * value[falling] / change[falling], -1.0))
-    return found[0], found[1]
+def length_of(value: Array, step: Array, share: float) -> float:
+    """Return the longest step, at most 1, that leaves each value 1 - share of itself."""
+    length = 1.0
+    for room, change in zip((share * value).tolist(), step.tolist(), strict=True):
+        if -change * length > room:
+            length = room / -change
+    return length

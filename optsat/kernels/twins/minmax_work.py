@@ -35,17 +35,20 @@ class Sizes:
         """Rows, lower bounds and upper bounds: each has a slack and a multiplier."""
         return self.rows + 2 * self.unknowns
 
+    @property
+    def padded(self) -> int:
+        """Length of a row of x and gamma with its padding, a multiple of four."""
+        return -(-(self.unknowns + 1) // 4) * 4
+
     def of_template(self) -> dict[str, int]:
         """Return the sizes under the names of the template."""
-        triangle = self.unknowns * (self.unknowns + 1) // 2
         return {
             "N": self.unknowns,
             "V": self.unknowns + 1,
+            "PADDED": self.padded,
             "ROWS": self.rows,
             "PAIRS": self.pairs,
             "PARAMETERS": self.parameters,
-            "HESSIAN": triangle,
-            "TRIANGLE": triangle + self.unknowns + 1,
             "STEPS": STEPS,
             "ADAPTIVE_STEPS": ADAPTIVE_STEPS,
             "FALLBACK_STEPS": FALLBACK_STEPS,
@@ -92,8 +95,9 @@ class MinmaxWork:
         self.now = MinmaxPoint(x[:n].copy(), 0.0, np.zeros(rows), np.ones(sizes.pairs))
         self.trial = self.now
         self.multiplier = np.zeros(sizes.pairs)
-        self.value, self.jacobian = np.zeros(rows), np.zeros((rows, n))
-        self.hessian = np.zeros(n * (n + 1) // 2)
+        self.value, self.row = np.zeros(rows), np.zeros((rows, n + 1))
+        self.inverse = np.ones(sizes.pairs)
+        self.hessian = np.zeros((n + 1, n + 1))
         self.gradient, self.dual_residual = np.zeros(n), np.zeros(n + 1)
         self.row_residual, self.product = np.zeros(rows), np.zeros(sizes.pairs)
         self.matrix = np.zeros((n + 1, n + 1))

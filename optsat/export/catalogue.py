@@ -115,6 +115,14 @@ CATALOGUE: Mapping[str, Entry] = {
         "optsat.estimators.certified_pair:certified_two_vector",
         "attitude from two vectors of bounded error, with the angle that its error never exceeds",
     ),
+    **{
+        f"certified_attitude_{n}": Entry(
+            "optsat.kernels.certified_attitude:certified_attitude",
+            f"attitude from {n} vectors of bounded error, with the angle that its error never exceeds",
+            {"vectors": n},
+        )
+        for n in range(2, 11)
+    },
     "extended_filter_7": Entry(
         "optsat.estimators.attitude_filter:extended_filter_7",
         "extended Kalman filter step of attitude and angular velocity, star tracker and gyro",

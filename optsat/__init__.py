@@ -12,11 +12,13 @@ from optsat._version import __version__
 from optsat.solve import solve
 
 if TYPE_CHECKING:
+    from optsat.attain import goal_attain, minimax
     from optsat.attitude.status import AttitudeStatus
     from optsat.determine import CertifiedBatch, certify_attitude, certify_attitude_batch, wahba
     from optsat.errors import InputError, NotProvenError, OptsatError, RecordError, UnknownOptionError
     from optsat.estimators.attitude_series import AttitudeSeries, Window, certify_record
     from optsat.estimators.isolation import Isolation, isolate
+    from optsat.export.export import Export, export_c
     from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
     from optsat.problems.component_box import ComponentBox
     from optsat.problems.wahba import Wahba, WahbaAttitude
@@ -32,6 +34,7 @@ _HOME = {
     "CertifiedAttitudeProblem": "optsat.problems.certified_attitude",
     "CertifiedBatch": "optsat.determine",
     "ComponentBox": "optsat.problems.component_box",
+    "Export": "optsat.export.export",
     "InputError": "optsat.errors",
     "Isolation": "optsat.estimators.isolation",
     "NotProvenError": "optsat.errors",
@@ -49,7 +52,10 @@ _HOME = {
     "certify_attitude": "optsat.determine",
     "certify_attitude_batch": "optsat.determine",
     "certify_record": "optsat.estimators.attitude_series",
+    "export_c": "optsat.export.export",
+    "goal_attain": "optsat.attain",
     "isolate": "optsat.estimators.isolation",
+    "minimax": "optsat.attain",
     "read_csv_log": "optsat.records.csv_log",
     "statistical_angle_bound": "optsat.statistical_bound",
     "wahba": "optsat.determine",
@@ -63,6 +69,7 @@ __all__ = [
     "CertifiedAttitudeProblem",
     "CertifiedBatch",
     "ComponentBox",
+    "Export",
     "InputError",
     "Isolation",
     "NotProvenError",
@@ -81,7 +88,10 @@ __all__ = [
     "certify_attitude",
     "certify_attitude_batch",
     "certify_record",
+    "export_c",
+    "goal_attain",
     "isolate",
+    "minimax",
     "read_csv_log",
     "solve",
     "statistical_angle_bound",

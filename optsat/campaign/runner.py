@@ -29,6 +29,7 @@ from optsat.errors import InputError, OptsatError
 _CASE_ERRORS = (OptsatError, ArithmeticError, ValueError, RuntimeError)
 
 _CHUNK_S = 2.0
+_WARM_S = 1.0
 _MOST_CASES_A_CHUNK = 4096
 _LEAST_CHUNKS_A_WORKER = 4
 
@@ -134,11 +135,19 @@ def _chunks(count: int, size: int) -> list[Chunk]:
 
 def _chunk_size(study: Study, design: Sequence[Case], seed: int, workers: int) -> int:
     """Return cases for about two seconds of work, from the time of the first case; no result depends on it."""
-    start = time.perf_counter()
-    _run_cases(study, design, seed, range(1))
-    second = time.perf_counter() - start
+    numerics_print()
+    second = _second_of_first_case(study, design, seed)
+    if second < _WARM_S:
+        # the first run of a short case is mostly imports
+        second = _second_of_first_case(study, design, seed)
     most = max(1, len(design) // (_LEAST_CHUNKS_A_WORKER * workers))
     return max(1, min(most, _MOST_CASES_A_CHUNK, round(_CHUNK_S / max(second, 1e-9))))
+
+
+def _second_of_first_case(study: Study, design: Sequence[Case], seed: int) -> float:
+    start = time.perf_counter()
+    _run_cases(study, design, seed, range(1))
+    return time.perf_counter() - start
 
 
 def _source_hash(study: Study) -> str:

@@ -225,7 +225,7 @@ def test_the_clock_of_the_first_case_sets_the_chunk_size(monkeypatch: pytest.Mon
     monkeypatch.undo()
 
     def size(second: float, cases: int, workers: int = 1) -> int:
-        ticks: Iterator[float] = iter([0.0, second])
+        ticks: Iterator[float] = iter([0.0, second, 0.0, second])
         monkeypatch.setattr(time, "perf_counter", lambda: next(ticks))
         return runner._chunk_size(toy_study.study, toy_study.study.cases(cases), 0, workers)
 

@@ -23,10 +23,15 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
         work->row[i] = (i < KERNEL_N) ? h[i] : (os_real_t)0;
         work->gain[i] = (os_real_t)0;
     }
+    os_real_t sum[KERNEL_N] = { (os_real_t)0 };
     for (int32_t k = 0; k < KERNEL_N; ++k) {
         for (int32_t i = 0; i < KERNEL_N; ++i) {
-            work->gain[i] += P[(k * KERNEL_N) + i] * work->row[k];
+            sum[i] += P[(k * KERNEL_N) + i] * work->row[k];
         }
+    }
+    for (int32_t i = 0; i < KERNEL_N; ++i) {
+        work->gain[i] = sum[i];
+        sum[i] = (os_real_t)0;
     }
     const os_real_t innovation = z - KERNEL_dot(work->row, work->theta);
     const os_real_t spread = (forgetting * variance) + KERNEL_dot(work->row, work->gain);
@@ -45,10 +50,12 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
         for (int32_t j = 0; j < KERNEL_N; ++j) {
             const int32_t place = (i * KERNEL_N) + j;
             work->covariance[place] = (P[place] - (work->gain[i] * work->gain[j])) * inflation;
+            sum[j] += work->covariance[place];
         }
         positive = positive && (work->covariance[i * (KERNEL_N + 1)] > (os_real_t)0);
     }
-    const bool finite = os_all_finite(work->theta, KERNEL_N) && os_all_finite(work->covariance, KERNEL_N * KERNEL_N);
+    /* a sum is finite only where all of its terms are */
+    const bool finite = os_all_finite(work->theta, KERNEL_N) && os_all_finite(sum, KERNEL_N);
     os_status_t status = OS_OK;
     if (!(usable && finite && positive)) {
         if (!os_all_finite(x, (KERNEL_N * (KERNEL_N + 2)) + 3)) {

@@ -30,7 +30,10 @@ def twin(n: int) -> Twin:
             gain *= scale
             theta += gain * (innovation * scale)
             covariance = (P - gain[:n, None] * gain[None, :n]) * inflation
-            finite = bool(np.isfinite(theta[:n]).all() and np.isfinite(covariance).all())
+            total = np.zeros(n)
+            for each in covariance:
+                total = total + each
+            finite = bool(np.isfinite(theta[:n]).all() and np.isfinite(total).all())
             positive = bool((np.diag(covariance) > 0.0).all())
             y = np.concatenate([theta[:n], covariance.ravel(), [innovation, spread * inflation]])
         if usable and finite and positive:

@@ -3,7 +3,8 @@ static os_real_t KERNEL_sine(os_real_t x)
 {
     os_real_t sum = (os_real_t)1;
     for (int32_t k = 22; k > 0; k -= 2) {
-        sum = (os_real_t)1 - ((x * x) * (sum / (os_real_t)(k * (k + 1))));
+        const int32_t divisor = k * (k + 1);
+        sum = (os_real_t)1 - ((x * x) * (sum / (os_real_t)divisor));
     }
     return x * sum;
 }

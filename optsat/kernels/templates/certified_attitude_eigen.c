@@ -31,14 +31,14 @@ static void KERNEL_rotate(int32_t n, int32_t p, int32_t q, KERNEL_work_t *work)
 /* Eigenvalues to the diagonal and eigenvectors to the columns of `vectors`, of the leading n x n part of `matrix`. */
 static void KERNEL_diagonalise(int32_t n, KERNEL_work_t *work)
 {
-    os_real_t rest = (os_real_t)1;
+    bool turning = true;
     for (int32_t i = 0; i < 4; ++i) {
         for (int32_t j = 0; j < 4; ++j) {
             work->vectors[i][j] = (i == j) ? (os_real_t)1 : (os_real_t)0;
         }
     }
-    for (int32_t sweep = 0; (sweep < KERNEL_SWEEPS) && (rest > (OS_EPSILON * OS_EPSILON)); ++sweep) {
-        rest = (os_real_t)0;
+    for (int32_t sweep = 0; (sweep < KERNEL_SWEEPS) && turning; ++sweep) {
+        os_real_t rest = (os_real_t)0;
         for (int32_t q = 1; q < n; ++q) {
             for (int32_t p = 0; p < q; ++p) {
                 const os_real_t between = os_fabs(work->matrix[p][q]);
@@ -48,5 +48,6 @@ static void KERNEL_diagonalise(int32_t n, KERNEL_work_t *work)
                 }
             }
         }
+        turning = rest > (OS_EPSILON * OS_EPSILON);
     }
 }

@@ -158,7 +158,8 @@ static os_real_t KERNEL_reach(bool of_multipliers, int32_t halvings, const KERNE
         outside = os_fmin(outside, end);
     }
     os_real_t length = outside;
-    for (int32_t k = 0; (k <= halvings) && (inside < outside); ++k) {
+    bool open = true;
+    for (int32_t k = 0; (k <= halvings) && open; ++k) {
         bool stays = true;
         for (int32_t which = 0; which < 2; ++which) {
             const KERNEL_cone_t *cone = &work->cone[which];
@@ -169,6 +170,7 @@ static os_real_t KERNEL_reach(bool of_multipliers, int32_t halvings, const KERNE
         inside = stays ? length : inside;
         outside = stays ? outside : length;
         length = (os_real_t)0.5 * (inside + outside);
+        open = inside < outside;
     }
     return inside;
 }

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,6 +22,24 @@ def test_hello_world_runs_and_says_what_it_promises(root: Path, capsys: pytest.C
     assert "3.511" in printed, "the bound of the worked example in degrees"
     assert "AttitudeStatus.INCONSISTENT" in printed
     assert "((2,),)" in printed, "the third measurement is the one to drop"
+
+
+def test_one_definition_is_called_compiled_and_differentiated(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code = _block((root / "README.md").read_text(encoding="utf-8"), "three-forms")
+    exec(compile(code, "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "(1000, 4)" in printed
+    assert "(4, 3)" in printed
+
+
+def test_goal_attainment_reaches_the_answer_beside_it(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code = _block((root / "README.md").read_text(encoding="utf-8"), "goal-attainment")
+    space: dict[str, Any] = {}
+    exec(compile(code, "README.md", "exec"), space)
+    answer = space["solution"].answer
+    assert answer.x == pytest.approx([2.0693664, 1.9306336], abs=1e-6)
+    assert answer.factor == pytest.approx(0.14835623, abs=1e-7)
+    assert "Proof.GLOBAL" in capsys.readouterr().out
 
 
 def test_the_two_commands_set_up_and_run(root: Path) -> None:

@@ -1,5 +1,6 @@
 """Attain: goals and worst cases of several objectives, by the first engine whose answer stands re-evaluation."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -17,12 +18,14 @@ from optsat.solve import Solver, solve
 
 if TYPE_CHECKING:
     from optsat.problems.goal_attainment import Attainment, GoalAttainment
+    from optsat.problems.least_violation import LeastViolation
     from optsat.problems.minimax import Minimax
 
 # KKT residual of an answer that is taken without trying the next engine
 _ACCURATE = 1e-8
 # factors closer than this, relative to their size (at least 1), count as equal
 _SAME = 1e-9
+_FEASIBLE = (Proof.FEASIBLE, Proof.STATIONARY, Proof.GLOBAL)
 
 
 @explain_unknown_options
@@ -167,7 +170,7 @@ def minimax(
 class EngineRun:
     """One run of one engine, judged by re-evaluation.
 
-    start : number of the start, one past the last where the best answer was taken up again
+    start : number of the start; one past the last where the best answer was taken up again, or a feasible point sought
     kkt, violation : recomputed residuals; seconds : wall time of the run
     verdict : why the answer was taken, or why the next engine was tried
     """
@@ -184,6 +187,49 @@ class EngineRun:
     verdict: str
 
 
+class _Search:
+    """The runs of one call, in order, with the engines that may take part."""
+
+    def __init__(self, problem: "GoalAttainment | Minimax", engine: "str | Solver") -> None:
+        self.problem = problem
+        self.form = problem.lower()
+        self.engine = engine
+        self.engines = _engines(self.form, engine)
+        self.found: list[Solution[Attainment]] = []
+        self.runs: list[EngineRun] = []
+
+    def run(self, engines: "list[Solver]", number: int, x: Array, dual: Array) -> None:
+        """Run the engines from one start, up to the first whose answer stands."""
+        for each in engines:
+            if _settled(self.once(self.problem, each, number, Point(x, dual, Termination.CONVERGED))):
+                break
+
+    def once(
+        self, problem: "GoalAttainment | Minimax | LeastViolation", engine: "Solver", number: int, start: Point
+    ) -> "Solution[Attainment]":
+        """Run one engine and keep its answer and how it was judged."""
+        began = perf_counter()
+        solution = solve(problem, engine, start)
+        self.runs.append(_judged(solution, engine.name, number, perf_counter() - began))
+        self.found.append(solution)
+        return solution
+
+    def least_violation(self, number: int) -> None:
+        """Look for a feasible point, and go on from it; or for a proof that there is none."""
+        from optsat.problems.least_violation import LeastViolation
+
+        relaxed = LeastViolation(self.problem.attainment)
+        if relaxed.vacuous:
+            return
+        for each in _engines(relaxed.lower(), "auto"):
+            solution = self.once(relaxed, each, number, Point(self.form.start, np.zeros(0), Termination.CONVERGED))
+            if solution.proof in _FEASIBLE:
+                self.run(self.engines, number, solution.answer.x, np.zeros(0))
+                return
+            if solution.proof is Proof.INFEASIBLE or solution.residuals.get("violation_kkt", np.inf) <= _ACCURATE:
+                return
+
+
 def _best(
     problem: "GoalAttainment | Minimax",
     start: "ArrayLike | Solution[Attainment] | None",
@@ -191,33 +237,27 @@ def _best(
     seed: int,
     engine: "str | Solver",
 ) -> "Solution[Attainment]":
-    form = problem.lower()
-    engines = _engines(form, engine)
+    search = _Search(problem, engine)
+    form, engines, found = search.form, search.engines, search.found
     # one engine of each method takes its turn at the further starts, since each falls into other local optima
     methods = list({type(each): each for each in reversed(engines)}.values())[::-1]
-    found: list[Solution[Attainment]] = []
-    runs: list[EngineRun] = []
-
-    def run(chosen: "list[Solver]", number: int, x: Array, dual: Array) -> None:
-        for each in chosen:
-            began = perf_counter()
-            found.append(solve(problem, each, Point(x, dual, Termination.CONVERGED)))
-            runs.append(_judged(found[-1], each.name, number, perf_counter() - began))
-            if _settled(found[-1]):
-                break
-
     points = sobol_starts(form.start, form.lower, form.upper, starts, seed)
-    run(engines, 0, points[0], start.answer.dual if isinstance(start, Solution) else np.zeros(0))
+    search.run(engines, 0, points[0], start.answer.dual if isinstance(start, Solution) else np.zeros(0))
     for number, x in enumerate(points[1:], 1):
         if any(each.proof in (Proof.GLOBAL, Proof.INFEASIBLE) for each in found):
             break
         if _defined(form, x):
-            run([methods[number % len(methods)]], number, x, np.zeros(0))
+            search.run([methods[number % len(methods)]], number, x, np.zeros(0))
     best = _chosen(found)
-    if starts > 1 and not _settled(best):
-        run(engines, len(points), best.answer.x, np.zeros(0))
+    if best.proof is Proof.NOTHING:
+        search.least_violation(len(points))
         best = _chosen(found)
-    return replace(best, stats={**best.stats, "runs": tuple(runs)})
+    elif starts > 1 and not _settled(best):
+        search.run(engines, len(points), best.answer.x, np.zeros(0))
+        best = _chosen(found)
+    if best.answer.violated:
+        warnings.warn(best.answer.message(), stacklevel=4)
+    return replace(best, stats={**best.stats, "runs": tuple(search.runs)})
 
 
 def _defined(form: MinMaxForm, x: Array) -> bool:
@@ -271,10 +311,11 @@ def _settled(solution: "Solution[Attainment]") -> bool:
 def _chosen(found: "list[Solution[Attainment]]") -> "Solution[Attainment]":
     """Return the feasible solution of least factor, of equal ones the best proven; else the least infeasible."""
     strength = [Proof.NOTHING, Proof.FEASIBLE, Proof.STATIONARY, Proof.INFEASIBLE, Proof.GLOBAL]
-    feasible = [each for each in found if each.proof in (Proof.FEASIBLE, Proof.STATIONARY, Proof.GLOBAL)]
+    feasible = [each for each in found if each.proof in _FEASIBLE]
     if not feasible:
         proven = [each for each in found if each.proof is Proof.INFEASIBLE]
-        return min(proven or found, key=lambda each: each.residuals.get("violation", float("inf")))
+        named = [each for each in found if each.answer.conflicting]
+        return min(proven or named or found, key=lambda each: each.residuals.get("violation", float("inf")))
     least = min(each.answer.factor for each in feasible)
     equal = [each for each in feasible if each.answer.factor <= least + _SAME * max(1.0, abs(least))]
     return max(equal, key=lambda each: (strength.index(each.proof), -each.residuals["kkt"]))

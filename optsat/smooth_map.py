@@ -130,3 +130,13 @@ def _stencil(here: float, step: float, lower: float, upper: float) -> tuple[tupl
     if here + 2 * step > upper and here - 2 * step >= lower:
         step = -step
     return (0.0, step, 2 * step), (-1.5 / step, 2 / step, -0.5 / step)
+
+
+def no_values(like: SmoothMap, lower: Array, upper: Array) -> SmoothMap:
+    """Return the map of x without values, symbolic where `like` is; lower, upper (n,) : bounds of x."""
+    if isinstance(like, SymbolicMap):
+        import casadi as ca
+
+        x, p = ca.SX.sym("x", len(lower)), ca.SX.sym("p", 0)
+        return SymbolicMap(ca.Function("nothing", [x, p], [ca.SX(0, 1)]), np.zeros(0))
+    return CallableMap(lambda x: np.zeros(0), 0, lower, upper)

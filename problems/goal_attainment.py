@@ -9,13 +9,14 @@ from numpy.typing import ArrayLike
 
 from optsat.arrays import Array, finite_array
 from optsat.attitude.backend import is_symbolic
-from optsat.certificates.convex_rows import convex_rows
 from optsat.certificates.dual_bound import dual_bound
 from optsat.certificates.first_order import FirstOrder, first_order
+from optsat.convex_rows import convex_rows
 from optsat.errors import InputError, explain_unknown_fields
 from optsat.forms import MinMaxForm, Point
 from optsat.problems.feasible_region import bounds, linear_rows, named_rows
-from optsat.problems.user_function import Unknowns, count_of, no_values, parameter_values, smooth_map
+from optsat.problems.user_function import Unknowns, count_of, parameter_values, smooth_map
+from optsat.smooth_map import no_values
 from optsat.solution import Proof, Solution, Termination
 
 # relative to the size of a bound, at least 1
@@ -41,6 +42,7 @@ class Attainment:
     constraint_multipliers, linear_multipliers (A rows, then Aeq rows), bound_multipliers : positive where an upper
     bound presses, negative where a lower one does
     violated : names of what is not satisfied, with how much is missing
+    conflicting : where no feasible point was found, names of the constraints that stand against each other
     """
 
     x: Array
@@ -55,12 +57,14 @@ class Attainment:
     bound_multipliers: Array
     violated: Mapping[str, float]
     dual: Array = field(repr=False)
+    conflicting: tuple[str, ...] = ()
 
     def message(self) -> str:
         """Return the result in one sentence."""
         if self.violated:
             worst = ", ".join(f"{name} by {amount:.3g}" for name, amount in self.violated.items())
-            return f"No point was found that satisfies all constraints; nearest one violates {worst}."
+            conflict = f" These stand against each other: {', '.join(self.conflicting)}." if self.conflicting else ""
+            return f"No point was found that satisfies all constraints; the nearest one violates {worst}.{conflict}"
         return f"Attainment factor {self.factor:.9g}, determined by the objectives {list(self.active)}."
 
 
@@ -103,7 +107,7 @@ class GoalAttainment:
         objectives = smooth_map("objectives", self.objectives, unknowns)
         if objectives.size == 0:
             raise InputError("`objectives` is empty; at least one is needed.")
-        constraints = no_values(unknowns, objectives)
+        constraints = no_values(objectives, unknowns.lower, unknowns.upper)
         if self.constraints is not None:
             constraints = smooth_map("constraints", self.constraints, unknowns)
         low, high = self.constraints_lb, self.constraints_ub
@@ -154,6 +158,11 @@ class GoalAttainment:
             lower=lower,
             upper=upper,
         )
+
+    @property
+    def attainment(self) -> "GoalAttainment":
+        """The problem itself, as of every min-max problem."""
+        return self
 
     def lower(self) -> MinMaxForm:
         """Return the min-max form."""

@@ -105,25 +105,15 @@ def smooth_map(name: str, function: Any, unknowns: Unknowns) -> SmoothMap:
     return result
 
 
-def no_values(unknowns: Unknowns, like: SmoothMap) -> SmoothMap:
-    """Return the map without values, of the same kind as `like`."""
-    if isinstance(like, SymbolicMap):
-        import casadi as ca
-
-        x, p = ca.SX.sym("x", unknowns.n), ca.SX.sym("p", len(unknowns.p))
-        return SymbolicMap(ca.Function("constraints", [x, p], [ca.SX(0, 1)]), unknowns.p)
-    return CallableMap(lambda x: np.zeros(0), 0, unknowns.lower, unknowns.upper)
-
-
 def _of_expression(name: str, expression: Any, unknowns: Unknowns) -> Any:
     import casadi as ca
 
     parts = list(expression) if isinstance(expression, Sequence) else [expression]
     try:
-        column = ca.vertcat(*(ca.vec(part) if is_symbolic(part) else part for part in parts))
+        column = type(unknowns.symbol)(ca.vertcat(*(ca.vec(part) if is_symbolic(part) else part for part in parts)))
     except (NotImplementedError, RuntimeError):
         raise InputError(f"`{name}` must be CasADi expressions of one kind (SX or MX), got {expression!r}.") from None
-    return _function(name, unknowns, type(unknowns.symbol)(column))
+    return _function(name, unknowns, column)
 
 
 def _of_function(name: str, function: Any, unknowns: Unknowns) -> Any:

@@ -6,6 +6,7 @@ if __name__ != "optsat.solvers":
 from optsat.solve import Solver
 from optsat.solvers.cell_cover import CellCoverSolver
 from optsat.solvers.clarabel import Clarabel
+from optsat.solvers.conic_minmax import ConicMinMax
 from optsat.solvers.davenport import Davenport
 from optsat.solvers.ipopt import Ipopt
 from optsat.solvers.scaled_semidefinite import ScaledSemidefinite
@@ -27,6 +28,7 @@ SOLVERS: tuple[Solver, ...] = (
     CellCoverSolver(),
     SubpavingSolver(),
     Clarabel(),
+    ConicMinMax(),
     Ipopt(),
     Sqp("daqp"),
     Sqp("osqp"),

@@ -91,14 +91,14 @@ def _solver(
     x, first = kind.sym("x", objectives.size1_in(0)), kind.sym("p", objectives.size1_in(1))
     second = kind.sym("q", constraints.size1_in(1))
     t, level, weight = kind.sym("t"), kind.sym("level", len(sign)), kind.sym("weight", len(sign))
-    values = objectives(x, first)[list(objective)]
+    values = objectives(x, first)[list(objective), 0]
     A = np.frombuffer(linear[1]).reshape(linear[0])
     programme = {
         "x": ca.vertcat(x, t),
         "p": ca.vertcat(first, second, level, weight),
         "f": t,
         "g": ca.vertcat(
-            np.array(sign) * values - level - weight * t, constraints(x, second), ca.mtimes(ca.DM(ca.sparsify(A)), x)
+            ca.DM(sign) * values - level - weight * t, constraints(x, second), ca.mtimes(ca.DM(ca.sparsify(A)), x)
         ),
     }
     return ca.nlpsol("epigraph", plugin, programme, json.loads(options))

@@ -1,6 +1,8 @@
 """IPOPT: filter interior point with exact derivatives, on the epigraph of a min-max form."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from optsat.forms import MinMaxForm, Point, required
 from optsat.solution import Termination
@@ -14,6 +16,15 @@ _TERMINATION = {
     "Maximum_Iterations_Exceeded": Termination.MAX_ITERATIONS,
     "Maximum_CpuTime_Exceeded": Termination.TIME_LIMIT,
     "Maximum_WallTime_Exceeded": Termination.TIME_LIMIT,
+}
+
+# keep the given point and multipliers instead of pushing them into the interior
+_WARM: Mapping[str, Any] = {
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.warm_start_bound_push": 1e-9,
+    "ipopt.warm_start_slack_bound_push": 1e-9,
+    "ipopt.warm_start_mult_bound_push": 1e-9,
+    "ipopt.mu_init": 1e-5,
 }
 
 
@@ -35,7 +46,7 @@ class Ipopt:
 
     def run(self, form: object, start: Point | None = None) -> Point:
         """Return the point at which IPOPT stops; `stats["status"]` keeps its own word."""
-        options = {
+        options: dict[str, Any] = {
             "print_time": False,
             "calc_lam_p": False,
             "show_eval_warnings": False,
@@ -48,4 +59,6 @@ class Ipopt:
             # relaxed bounds would report an optimum below the true one
             "ipopt.bound_relax_factor": 0.0,
         }
+        if start is not None and len(start.dual):
+            options |= _WARM
         return run_epigraph(required(form, MinMaxForm, self.name), "ipopt", options, _TERMINATION, start)

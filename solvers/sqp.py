@@ -22,7 +22,7 @@ _QUIET: Mapping[str, Mapping[str, Any]] = {
     "ipqp": {"print_header": False, "print_iter": False, "print_info": False, "linear_solver": "qr"},
 }
 
-# share of the row farthest below the factor: about a tenth of that of the row which determines it
+# equal shares would often balance, as those of F <= t and -F <= t do; small ones lead to indefinite first Hessians
 _FAVOUR = 0.1
 
 _TERMINATION = {
@@ -80,20 +80,28 @@ class Sqp:
         }
         x0 = form.start if start is None else start.x
         dual = np.zeros(0) if start is None else start.dual
-        started = Point(x0, dual if len(dual) else _first_multipliers(form, x0), Termination.CONVERGED)
-        return run_epigraph(form, "sqpmethod", options, _TERMINATION, started)
+        started = Point(x0, dual if len(dual) else _first_multipliers(form, x0, _FAVOUR), Termination.CONVERGED)
+        point = run_epigraph(form, "sqpmethod", options, _TERMINATION, started)
+        if point.iterations == 0 and point.termination is Termination.CONVERGED:
+            # its test of optimality leaves out complementarity, so that multipliers which balance by chance end it at
+            # the start; all weight on the row that determines the factor is complementary
+            started = Point(x0, _first_multipliers(form, x0, 0.0), Termination.CONVERGED)
+            point = run_epigraph(form, "sqpmethod", options, _TERMINATION, started)
+        return point
 
 
-def _first_multipliers(form: MinMaxForm, x0: Array) -> Array:
-    """Return weights that favour the rows near the factor: with none, the first Hessian would be zero.
+def _first_multipliers(form: MinMaxForm, x0: Array, others: float) -> Array:
+    """Return weights that favour the row which determines the factor: with none, the first Hessian would be zero.
 
-    Equal ones could balance by chance, as those of F <= t and -F <= t do, and the start would pass for an optimum.
+    others : share of the row farthest below it, about, in units of its own
     """
     rows = form.rows(form.objectives.values(x0))
     soft = form.weight > 0
     ratio = rows[soft] / form.weight[soft]
     below = np.max(ratio) - ratio
-    share = 1 / (_FAVOUR + below / max(float(np.max(below)), np.finfo(np.float64).tiny))
+    size = others + below / max(float(np.max(below)), np.finfo(np.float64).tiny)
+    share = np.divide(others, size, out=np.zeros_like(size), where=size > 0)
+    share[np.argmax(ratio)] = 1.0
     dual = np.zeros(len(rows) + form.constraints.size + len(form.A) + len(form.lower))
     dual[: len(rows)][soft] = share / float(share @ form.weight[soft])
     return dual

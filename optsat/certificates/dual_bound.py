@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from optsat.arrays import Array, Mask
-from optsat.certificates.convex_rows import ConvexRows
 from optsat.certificates.first_order import FirstOrder
+from optsat.convex_rows import ConvexRows
 from optsat.forms import MinMaxForm
 from optsat.smooth_map import SymbolicMap
 from optsat.symbolic.interval_evaluation import evaluate_over_box

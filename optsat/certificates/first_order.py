@@ -116,12 +116,15 @@ def first_order(form: MinMaxForm, x: Array, dual: Array) -> FirstOrder:
     """Return the first-order residuals at x with the best multipliers: the solver's, or fitted to the active rows.
 
     x (n,) : where all functions are finite; dual : in the form's order, or empty
+    At a kink where a derivative does not exist the residuals are infinite.
     """
     rows = one_sided_rows(form, x)
     length = len(form.weight) + form.constraints.size + len(form.A) + len(x)
-    candidates = [_fitted(rows, rows.slack <= tolerance * rows.scale) for tolerance in _ACTIVE]
     weight_sum = float("nan")
-    if len(dual) == length and np.all(np.isfinite(dual)):
+    candidates = []
+    if np.all(np.isfinite(rows.gradient)):
+        candidates = [_fitted(rows, rows.slack <= tolerance * rows.scale) for tolerance in _ACTIVE]
+    if candidates and len(dual) == length and np.all(np.isfinite(dual)):
         given = rows.multipliers(dual)
         weight_sum = float(rows.weight @ given)
         candidates.append(given)

@@ -119,6 +119,13 @@ def positive_semidefinite(Q: Array) -> bool:
     return bool(values[0] >= -_ROUNDING * len(Q) * np.abs(values).max())
 
 
+def square_root(Q: Array) -> Array:
+    """Return R (rank, n) with R' R = Q for a positive semidefinite Q (n, n)."""
+    values, vectors = np.linalg.eigh(Q)
+    kept = values > _ROUNDING * len(values) * values[-1]
+    return np.asarray(np.sqrt(values[kept])[:, None] * vectors[:, kept].T)
+
+
 def shapes_of(function: Any, p: Array, lower: Array, upper: Array) -> list[Shape]:
     """Return the shapes of the values of a CasADi SXFunction of (x, p) -> (k, 1) for lower <= x <= upper.
 
@@ -285,9 +292,7 @@ def _norm_of(a: Shape) -> Norm | None:
     """Return sqrt(a) as a norm where a is a quadratic that is nowhere negative."""
     if not a.quadratic or a.affine or not positive_semidefinite(a.Q):
         return None
-    values, vectors = np.linalg.eigh(a.Q)
-    kept = values > _ROUNDING * len(values) * values[-1]
-    L = np.sqrt(values[kept] / 2)[:, None] * vectors[:, kept].T
+    L = square_root(a.Q / 2)
     e = np.linalg.lstsq(2 * L.T, a.c, rcond=None)[0]
     size = max(1.0, float(np.abs(a.c).max()), abs(a.d))
     if float(np.abs(2 * L.T @ e - a.c).max()) > 1e-12 * size:

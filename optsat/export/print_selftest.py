@@ -13,14 +13,14 @@ from optsat.port import Port
 
 ALLOWED = {"exact": 0.0, "libm": 64.0, "float": 4096.0}
 """Largest difference from Python that passes, in units in the last place of the largest number that a result has in any
-vector: without and with functions of the machine's mathematical library, and in float, whose reference is double."""
+vector: without and with elementary functions, and in float, whose reference is double."""
 
 
 def allowed_difference(interface: Interface, precision: Precision) -> float:
     """Return the largest difference that passes."""
     if precision == "float":
         return ALLOWED["float"]
-    return ALLOWED["libm" if interface.source.libm else "exact"]
+    return ALLOWED["exact" if interface.source.is_exact else "libm"]
 
 
 def print_selftest(interface: Interface, vectors: Sequence[Vector], precision: Precision) -> str:

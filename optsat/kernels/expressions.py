@@ -2,9 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from optsat.kernels.codes import TRUTH
 from optsat.kernels.program import Constant, Input, Operation, Program
+
+CIRCULAR = frozenset({"SIN", "COS", "TAN"})
+"""Codes that sine and cosine of their operand give."""
 
 
 @dataclass(frozen=True)
@@ -15,6 +19,7 @@ class Language:
     number : template that makes a number of the truth value {p}; truth : a truth value of the number {a}
     constant, load : spelling of a constant, of an input
     words : what else the templates name in braces
+    pair : what gives sine and cosine of {a} together, which the templates call {pair}; "" where there is no such thing
     """
 
     operations: Mapping[str, str]
@@ -23,6 +28,7 @@ class Language:
     constant: Callable[[float], str]
     load: Callable[[Input], str]
     words: Mapping[str, str]
+    pair: str = ""
 
     def write(self, template: str, **operands: str) -> str:
         """Return the template with the operands and the words in place."""
@@ -31,23 +37,31 @@ class Language:
 
 @dataclass(frozen=True)
 class Assignment:
-    """One variable, whether it holds a truth value, and its expression."""
+    """One variable, what it holds, and its expression."""
 
     variable: str
-    is_truth: bool
+    kind: Literal["number", "truth", "pair"]
     expression: str
 
 
 def assignments(program: Program, language: Language) -> Iterator[Assignment]:
     """Yield a variable for each input and operation, in order; constants stand where they are used."""
+    paired: set[int] = set()
     for index, node in enumerate(program.nodes):
         if isinstance(node, Input):
-            yield Assignment(f"t{index}", False, language.load(node))
+            yield Assignment(f"t{index}", "number", language.load(node))
         elif isinstance(node, Operation):
             numbers = [as_number(program, i, language) for i in node.operands]
             truths = [_as_truth(program, i, language) for i in node.operands]
             named = dict(zip("ab", numbers, strict=False)) | dict(zip("pq", truths, strict=False))
-            yield Assignment(f"t{index}", node.code in TRUTH, language.write(language.operations[node.code], **named))
+            if language.pair and node.code in CIRCULAR:
+                operand = node.operands[0]
+                named["pair"] = f"p{operand}"
+                if operand not in paired:
+                    paired.add(operand)
+                    yield Assignment(named["pair"], "pair", language.write(language.pair, **named))
+            kind: Literal["number", "truth"] = "truth" if node.code in TRUTH else "number"
+            yield Assignment(f"t{index}", kind, language.write(language.operations[node.code], **named))
 
 
 def as_number(program: Program, index: int, language: Language) -> str:

@@ -7,6 +7,7 @@ from importlib import resources
 from typing import TypeAlias
 
 from optsat.errors import InputError
+from optsat.kernels.elementary import libm_of
 from optsat.kernels.print_scalar import c_constant, print_scalar
 from optsat.kernels.program import Program, starts
 from optsat.kernels.source import KernelSource, Twin
@@ -87,7 +88,7 @@ def instantiate(
         outputs=tuple(outputs),
         body=re.sub(r"\bKERNEL(?=_|\b)", name, text),
         has_status=True,
-        libm=tuple(sorted({function for leaf in leaves.values() for function in leaf.libm})),
+        libm=tuple(sorted({function for leaf in leaves.values() for function in _libm(leaf)})),
         operations=sum(map(operation_count, leaves.values())) if operations is None else operations,
         twin=twin,
     )
@@ -100,6 +101,10 @@ def _read(template: str) -> str:
 def operation_count(leaf: Leaf) -> int:
     """Return the operations of one sample of what fills a slot."""
     return leaf.operations if isinstance(leaf, KernelSource) else leaf.operation_count
+
+
+def _libm(leaf: Leaf) -> tuple[str, ...]:
+    return leaf.libm if isinstance(leaf, KernelSource) else libm_of(leaf, "own")
 
 
 def _words_of_slots(text: str) -> set[str]:

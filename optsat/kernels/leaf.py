@@ -3,14 +3,19 @@
 from collections.abc import Sequence
 
 from optsat.errors import InputError
+from optsat.kernels.elementary import Math, libm_of
+from optsat.kernels.print_lanes import print_lanes
 from optsat.kernels.print_scalar import print_scalar
 from optsat.kernels.program import Program
 from optsat.kernels.source import KernelSource
 from optsat.port import Port
 
 
-def leaf_source(program: Program, inputs: Sequence[Port], outputs: Sequence[Port]) -> KernelSource:
+def leaf_source(program: Program, inputs: Sequence[Port], outputs: Sequence[Port], math: Math = "own") -> KernelSource:
     """Return the kernel of a folded program, its arguments and results described by ports.
+
+    math : "own", elementary functions with the same bits on every machine, at every width; or "libm", those of the
+        machine's library, which CasADi calls too
 
     Raises
     ------
@@ -24,7 +29,8 @@ def leaf_source(program: Program, inputs: Sequence[Port], outputs: Sequence[Port
         name=program.name,
         inputs=tuple(inputs),
         outputs=tuple(outputs),
-        body=print_scalar(program, dense=True),
-        libm=program.libm,
+        body=print_scalar(program, dense=True, math=math),
+        lanes=print_lanes(program, dense=True, math=math),
+        libm=libm_of(program, math),
         operations=program.operation_count,
     )

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from optsat.arrays import Array
+from optsat.kernels.elementary import headers_of
 from optsat.port import Port
 
 Twin = Callable[[Array], tuple[int, Array]]
@@ -16,7 +17,7 @@ class KernelSource:
 
     Arguments stand dense, matrices counted by rows, one after another in x; results in y likewise.
 
-    body : text that defines either
+    body : text that includes what it needs beside `os_rt.h` and defines either
         `static inline void NAME_leaf(const os_real_t *x, os_real_t *y)`, or where `has_status`
         `static os_status_t NAME_body(const os_real_t *x, os_real_t *y, NAME_work_t *work)` and its struct NAME_work_t;
         all of x is read before any of y is written
@@ -35,3 +36,8 @@ class KernelSource:
     libm: tuple[str, ...] = ()
     operations: int = 0
     twin: Twin | None = None
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether Python gives the same bits: no elementary function is called, neither the library's nor our own."""
+        return not self.libm and not headers_of(self.body)

@@ -69,6 +69,11 @@ def exact_codes() -> list[Case]:
     return cases(2, EXACT_CODES)
 
 
+def printed(program: Program) -> str:
+    """The leaf with the functions that the virtual machine calls."""
+    return scalar_printer.print_scalar(program, math="libm")
+
+
 def every_code() -> ca.Function:
     """One result for each code, of two numbers."""
     a, b = ca.SX.sym("a"), ca.SX.sym("b")
@@ -93,7 +98,7 @@ def test_the_graphs_hold_every_code_and_special_values(all_codes: list[Case]) ->
 def test_c_has_the_bits_of_the_virtual_machine(
     compiler: str, optimisation: str, all_codes: list[Case], tmp_path: Path
 ) -> None:
-    leaves = [(case.program, scalar_printer.print_scalar(case.program)) for case in all_codes]
+    leaves = [(case.program, printed(case.program)) for case in all_codes]
     batches = compiled(compiler_named(compiler), leaves, tmp_path, optimisation)
     found = {
         case.program.name: count
@@ -107,7 +112,7 @@ def test_c_has_the_bits_of_the_virtual_machine(
 def test_c_has_the_bits_of_the_virtual_machine_on_all_pairs_of_special_values(compiler: str, tmp_path: Path) -> None:
     function = every_code()
     program = lower(function)
-    (batch,) = compiled(compiler_named(compiler), [(program, scalar_printer.print_scalar(program))], tmp_path)
+    (batch,) = compiled(compiler_named(compiler), [(program, printed(program))], tmp_path)
     x = all_pairs()
     found, expected = batch(x), on_machine(function, x)
     copysign = sorted(ARITY).index("COPYSIGN")
@@ -120,7 +125,7 @@ def test_c_has_the_bits_of_the_virtual_machine_on_all_pairs_of_special_values(co
 def test_folding_keeps_the_bits(all_codes: list[Case], tmp_path: Path) -> None:
     few = [case for case in all_codes if len(read_instructions(case.function).nodes) > len(case.program.nodes)][:10]
     raw = [read_instructions(case.function) for case in few]
-    leaves = [(program, scalar_printer.print_scalar(program)) for program in raw]
+    leaves = [(program, printed(program)) for program in raw]
     for case, batch in zip(few, compiled(any_compiler(), leaves, tmp_path, "-O0"), strict=True):
         assert differences(batch(case.x), case.expected) == 0
 
@@ -131,9 +136,9 @@ def test_results_may_overwrite_the_arguments(all_codes: list[Case], tmp_path: Pa
     parts: Any = function.call([x[:3], ca.SX(function.sparsity_in(1), x[3:6]), x[6:]])
     square = ca.Function("square", [x], [ca.vertcat(*parts[0].nonzeros())])
     program = lower(square)
-    (batch,) = compiled(any_compiler(), [(program, scalar_printer.print_scalar(program))], tmp_path)
+    (batch,) = compiled(any_compiler(), [(program, printed(program))], tmp_path)
     assert differences(batch(all_codes[1].x), on_machine(square, all_codes[1].x)) == 0
-    leaf = scalar_printer.print_scalar(program)
+    leaf = printed(program)
     # every load stands before the first store, in the text too
     assert leaf.rindex("= x[") < leaf.index("y[0] =")
 
@@ -221,7 +226,7 @@ def test_the_fuzz_finds_every_mistake_in_the_c_table(
                 patch.setitem(scalar_printer.OPERATIONS, code, template)
                 for case in mistaken(all_codes, code):
                     program = replace(case.program, name=f"leaf_{len(leaves)}")
-                    leaves.append((program, scalar_printer.print_scalar(program)))
+                    leaves.append((program, printed(program)))
                     of_mistake.append(((code, template), case))
     caught = dict.fromkeys((mistake for mistake, _ in of_mistake), 0)
     for (mistake, case), batch in zip(of_mistake, compiled(any_compiler(), leaves, tmp_path, "-O0"), strict=True):
@@ -231,7 +236,7 @@ def test_the_fuzz_finds_every_mistake_in_the_c_table(
 
 @pytest.mark.parametrize("mistake", ["(a > 0.0) || (a < 0.0)", "a > 0.0", "!isnan(a) || (a < 0.0)"])
 def test_the_fuzz_finds_a_wrong_truth_value(mistake: str, all_codes: list[Case], tmp_path: Path) -> None:
-    texts = [scalar_printer.print_scalar(case.program) for case in all_codes]
+    texts = [printed(case.program) for case in all_codes]
     used = [(case, text) for case, text in zip(all_codes, texts, strict=True) if "os_truth(" in text]
     leaves = [(case.program, text.replace("os_truth(", "mistaken(")) for case, text in used]
     extra = f"static bool mistaken(double a) {{ return {mistake}; }}"
@@ -290,7 +295,7 @@ def test_float_has_the_bits_of_float_arithmetic(compiler: str, tmp_path: Path) -
     for k in range(GRAPHS):
         rng = np.random.default_rng([4, k])
         program = lower(random_graph(rng, f"graph_{k}", sorted(EXACT), STEPS, k % 5 == 0, CONSTANTS_FLOAT))
-        leaf = scalar_printer.print_scalar(program)
+        leaf = printed(program)
         check_float_constants(program.name, leaf)
         leaves.append((program, leaf))
         samples.append(random_inputs(rng, SAMPLES, SPECIAL_FLOAT).astype(np.float32))

@@ -38,7 +38,9 @@ def export_command(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
-    misra: Annotated[bool, typer.Option("--misra", help="Check large kernels against MISRA too, for minutes.")] = False,
+    misra: Annotated[
+        str, typer.Option(help="Kernels to check against MISRA C: none, small or all; large ones take minutes.")
+    ] = "small",
     listed: Annotated[bool, typer.Option("--list", help="List the kernels and their parameters.")] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -15,7 +15,7 @@ from optsat.export.bundle import Bundle
 from optsat.export.catalogue import ARITHMETIC, Kernel, build, entry_named
 from optsat.export.definition import Definition, define
 from optsat.export.interface import Interface
-from optsat.export.misra import check, print_record
+from optsat.export.misra import Extent, check, print_record
 from optsat.export.object_file import ObjectFile
 from optsat.export.print_readme import print_readme
 from optsat.export.provenance import Measured
@@ -24,6 +24,7 @@ from optsat.export.verify import Replay, Verification, check_answers, verify
 from optsat.files import write_atomically
 from optsat.kernels.float_constants import check_float_constants
 
+_EXTENTS: Mapping[str, Extent] = {"none": "none", "small": "small", "all": "all"}
 _PRECISIONS: Mapping[str, Precision] = {"float": "float", "double": "double"}
 
 
@@ -62,7 +63,7 @@ def export_c(
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     keep_last: Mapping[str, Sequence[str]] | None = None,
     force: bool = False,
-    misra: bool = False,
+    misra: str = "small",
 ) -> Export:
     """Write kernels as flight C with header, self-test, build files and provenance; compile and run them first.
 
@@ -70,7 +71,8 @@ def export_c(
     target : "desktop", "cortex-m4" or "cortex-m7"; precision : "float" or "double", by default that of its processor
     parameters : by name of the kernel, what its definition takes; keep_last : by name, results that hold their last
     good value after a failure
-    force : replace files that are there; misra : also check kernels against MISRA that take minutes
+    force : replace files that are there; misra : which kernels to check against MISRA C,
+    "none", "small" or "all"; large ones take minutes
 
     Raises
     ------
@@ -78,6 +80,8 @@ def export_c(
     SelfTestError : the C does not answer as Python does; ToolError : the compiler fails. Nothing is written then.
     OSError : the folder cannot be made or written.
     """
+    if misra not in _EXTENTS:
+        raise InputError(f"`misra` must be 'none', 'small' or 'all', got {misra!r}.")
     bundle = gather(kernels, target, precision, parameters or {}, keep_last or {})
     out = Path(folder)
     draft = bundle.texts({})
@@ -86,7 +90,7 @@ def export_c(
         found = verify(bundle, folder_of_draft)
     check_answers(found, bundle.allowed)
     texts = bundle.texts({name: _measured(name, found) for name in bundle.names})
-    texts["DEVIATIONS.md"], unchecked = _deviations(bundle, texts, misra)
+    texts["DEVIATIONS.md"], unchecked = _deviations(bundle, texts, _EXTENTS[misra])
     export = Export(
         folder=out,
         target=bundle.target,
@@ -114,10 +118,10 @@ def _written(texts: Mapping[str, str]) -> Iterator[Path]:
         yield Path(temporary)
 
 
-def _deviations(bundle: Bundle, texts: Mapping[str, str], large: bool) -> tuple[str, list[str]]:
+def _deviations(bundle: Bundle, texts: Mapping[str, str], extent: Extent) -> tuple[str, list[str]]:
     # of the final texts, whose lines the record names
     with _written(texts) as folder:
-        findings, unchecked = check(bundle, folder, large)
+        findings, unchecked = check(bundle, folder, extent)
     return print_record(findings, unchecked), unchecked
 
 

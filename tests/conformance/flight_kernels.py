@@ -1,6 +1,6 @@
 """Kernels that use every feature of the flight form, small enough to be compiled in every way by every test."""
 
-import math
+import functools
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,12 +10,9 @@ import numpy as np
 import pytest
 
 from optsat.arrays import Array
-from optsat.export.build_files import WARNINGS, flags
 from optsat.export.bundle import Bundle
 from optsat.export.catalogue import Kernel
 from optsat.export.export import gather
-from optsat.export.target import Target
-from optsat.export.tools import run_tool
 from optsat.kernels.source import KernelSource
 from optsat.port import Port
 from optsat.symbolic.generated_function import generate
@@ -127,14 +124,17 @@ KERNELS: Mapping[str, Callable[[], Kernel] | None] = {
     "dcm_from_quaternion": None,
     "quaternion_from_dcm": None,
     "rigid_body_step": None,
+    "wahba_4": None,
+    "unscented_filter_7_loops": None,
 }
 """Kernel by name; None is one of the catalogue."""
 
 KEPT = {"turned_attitude": ("q_BN",)}
 
 
+@functools.cache
 def bundle_of(name: str, target: str = "desktop", precision: str = "double") -> Bundle:
-    make = KERNELS[name]
+    make = KERNELS.get(name)
     kept = {name: KEPT[name]} if name in KEPT else {}
     return gather([name if make is None else make()], target, precision, {}, kept)
 
@@ -151,14 +151,3 @@ def tool(name: str) -> str:
     if path is None:
         pytest.skip(f"{name} is not on the path")
     return path
-
-
-def compile_object(compiler: str, bundle: Bundle, folder: Path, name: str, target: Target, *more: str) -> Path:
-    """The object file of a kernel written to `folder`, under all warnings."""
-    command = [compiler, *flags(target, bundle.precision), *WARNINGS, *more]
-    run_tool([*command, "-c", f"{name}.c", "-o", f"{name}.o"], folder)
-    return folder / f"{name}.o"
-
-
-def is_close(a: float, b: float) -> bool:
-    return math.isclose(a, b, rel_tol=1e-12)

@@ -1,5 +1,6 @@
 """Guards under assault: a million plausible calls, 200,000 hostile ones, under the sanitizers, never a bad answer."""
 
+import os
 import re
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from optsat.export.tools import run_tool
 from optsat.export.verify import replay
 
 PLAUSIBLE, HOSTILE = 1_000_000, 200_000
+# 40 times slower than the others: a part of the calls, all of them with OPTSAT_ALL_CALLS=1
+HEAVY = {"unscented_filter_7_loops"}
 SANITIZERS = ("-O1", "-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 HEADER = Path(__file__).with_name("flight_assault.h")
 
@@ -49,11 +52,13 @@ def assaulted(
 @pytest.mark.parametrize("precision", ["double", "float"])
 @pytest.mark.parametrize("name", KERNELS)
 def test_no_answer_is_bad_and_every_refusal_is_safe(name: str, precision: str, tmp_path: Path) -> None:
-    plausible, accepted, _, let_through, violations = assaulted(name, precision, tmp_path, calls=PLAUSIBLE)
+    share = 1 if name not in HEAVY or os.environ.get("OPTSAT_ALL_CALLS") else 25
+    counts = assaulted(name, precision, tmp_path, calls=PLAUSIBLE // share, hostile=HOSTILE // share)
+    plausible, accepted, hostile, let_through, violations = counts
     assert violations == 0
     # neither all nor nothing: both sides of the guards were walked
     assert accepted > plausible // 50
-    assert 0 < let_through < HOSTILE
+    assert 0 < let_through < hostile
 
 
 MISTAKES = {

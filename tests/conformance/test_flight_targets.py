@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from flight_kernels import KERNELS, bundle_of, tool, written
+from flight_kernels import bundle_of, tool, written
 
 from optsat.export.build_files import WARNINGS, flags
 from optsat.export.bundle import Bundle
@@ -12,6 +12,9 @@ from optsat.export.target import TARGETS
 from optsat.export.tools import run_tool
 from optsat.export.verify import replay, verify
 
+FEW = ("newton_root", "mean_direction", "covariance_step", "rigid_body_step", "wahba_4", "unscented_filter_7_loops")
+# sines, arc tangents and their like, by our own functions
+ELEMENTARY = ("sun", "euler321_from_quaternion")
 CORTEX = {"cortex-m7": "double", "cortex-m4": "float"}
 
 
@@ -22,13 +25,15 @@ def bits_here(bundle: Bundle, folder: Path) -> tuple[str, int]:
     return said.bits, said.wrong_status
 
 
-@pytest.mark.parametrize("name", KERNELS)
+@pytest.mark.parametrize("name", [*FEW, *ELEMENTARY])
 @pytest.mark.parametrize("target", CORTEX)
 def test_cortex_m_gives_the_bits_of_this_computer(target: str, name: str, tmp_path: Path) -> None:
     tool(TARGETS[target].compilers[0])
     tool(TARGETS[target].simulator[0])
     precision = CORTEX[target]
     bundle = bundle_of(name, target, precision)
+    if libm := bundle.definitions[0].source.libm:
+        pytest.skip(f"{name} needs {', '.join(libm)} of the C library, whose last bits belong to the machine")
     found = verify(bundle, written(bundle, tmp_path / target))
     said = found.replays[name]
     assert found.missing == ()
@@ -42,7 +47,7 @@ def test_cortex_m_gives_the_bits_of_this_computer(target: str, name: str, tmp_pa
 @pytest.mark.parametrize("precision", ["double", "float"])
 def test_aarch64_gives_the_bits_of_this_computer(precision: str, tmp_path: Path) -> None:
     compiler, simulator = tool("aarch64-linux-gnu-gcc"), tool("qemu-aarch64")
-    for name in KERNELS:
+    for name in FEW[:5]:
         bundle = bundle_of(name, precision=precision)
         folder = written(bundle, tmp_path / name)
         sources = ["selftest.c", f"{name}.c", f"{name}_selftest.c"]

@@ -211,8 +211,10 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
     const os_real_t *u = &x[KERNEL_N * (KERNEL_N + 1)];
     const os_real_t *z = &u[KERNEL_U];
     const os_real_t *Q = &z[KERNEL_M];
-    const os_real_t *R = &Q[(KERNEL_FULL == 1) ? (KERNEL_N * KERNEL_N) : KERNEL_N];
-    const int32_t arguments = (int32_t)(R - x) + ((KERNEL_FULL == 1) ? (KERNEL_M * KERNEL_M) : KERNEL_M);
+    const int32_t process = (KERNEL_FULL == 1) ? (KERNEL_N * KERNEL_N) : KERNEL_N;
+    const int32_t measured = (KERNEL_FULL == 1) ? (KERNEL_M * KERNEL_M) : KERNEL_M;
+    const os_real_t *R = &Q[process];
+    const int32_t arguments = (KERNEL_N * (KERNEL_N + 1)) + KERNEL_U + KERNEL_M + process + measured;
     const int32_t results = (KERNEL_N * (KERNEL_N + 1)) + (KERNEL_M * (KERNEL_M + 1));
     os_status_t status = os_all_finite(x, arguments) ? OS_OK : OS_E_NOT_FINITE;
     if (status == OS_OK) {

@@ -17,7 +17,7 @@ needs_compiler = pytest.mark.skipif(find_tool(*TARGETS["desktop"].compilers) is 
 
 @needs_compiler
 def test_double_without_libm_has_the_bits_of_python(tmp_path: Path) -> None:
-    export = export_c(["dcm_from_quaternion", "rigid_body_step"], tmp_path / "flight")
+    export = export_c(["dcm_from_quaternion", "rigid_body_step"], tmp_path / "flight", misra="none")
     assert sorted(path.name for path in (tmp_path / "flight").iterdir()) == list(export.files)
     for kernel in export.kernels:
         assert kernel.replay is not None
@@ -47,6 +47,7 @@ def test_without_a_compiler_the_files_are_written_and_what_is_unchecked_is_said(
         (["rigid_bodystep"], "Did you mean `rigid_body_step`"),
         (["sun", "--target", "cortexm7"], "Did you mean `cortex-m7`"),
         (["sun", "--precision", "single"], "'float' or 'double', got 'single'"),
+        (["sun", "--misra", "some"], "'none', 'small' or 'all', got 'some'"),
         (["sun", "sun"], "named twice"),
         ([], "No kernel was named"),
         (["sun", "--parameter", "colour=1"], "no parameter `colour`"),

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from optsat.commands import attitude, bench, demo, doctor, export, simulate, study, verify
+from optsat.commands import attitude, bench, cache, demo, doctor, export, simulate, study, study_report, verify
 from optsat.commands.output import note
 from optsat.errors import OptsatError
 
@@ -60,8 +60,10 @@ app.command("simulate", epilog="Example: optsat simulate scenario.toml --out log
 app.command("export", epilog="Example: optsat export rigid_body_step --target cortex-m7 --out flight")(
     export.export_command
 )
+study.app.command("report", epilog="Example: optsat study report results --format pdf")(study_report.report_command)
 app.add_typer(study.app, name="study", epilog="Example: optsat study list")
 app.command("bench", epilog="Example: optsat bench kernels --json")(bench.bench_command)
+app.add_typer(cache.app, name="cache", epilog="Example: optsat cache show")
 app.command("doctor", epilog="Example: optsat doctor --json")(doctor.doctor_command)
 
 

@@ -20,6 +20,7 @@ from optsat.attitude.davenport import canonical, davenport_matrix, dominant_quat
 from optsat.campaign.claim import Claim, judge_bar
 from optsat.campaign.study import Case, Row, Study
 from optsat.estimators.attitude_series import AttitudeSeries, Window, certify_record
+from optsat.plots.svg_file import write_svg
 from optsat.records.broad import load_broad
 from optsat.records.record import Record
 
@@ -121,7 +122,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     upper.legend(frameon=False, ncols=5, fontsize=8, loc="upper center")
     lower.plot(t, [row["rate_deg_s"] for row in rows], color="#333333", lw=0.8)
     lower.set(xlabel="time [s]", ylabel="rate [deg/s]")
-    canvas.savefig(path)
+    write_svg(canvas, path)
 
 
 def _shown(rows: Sequence[Row], name: str) -> Array:

@@ -19,6 +19,7 @@ from optsat.determine import certify_attitude_batch
 from optsat.estimators.attitude_series import History, Window, certify_record
 from optsat.estimators.relative_attitude import RelativeAttitude
 from optsat.models.epoch import Epoch
+from optsat.plots.svg_file import write_svg
 from optsat.records.record import Record
 from optsat.simulation.orbit_scenario import OrbitScenario
 
@@ -189,7 +190,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     axes.set_ylabel("RMS angle [deg]")
     axes.set_title("RMS attitude error (bars) and RMS guaranteed bound (lines)")
     axes.legend(frameon=False, ncols=2, loc="upper left", bbox_to_anchor=(0, -0.08))
-    canvas.savefig(path)
+    write_svg(canvas, path)
 
 
 study = Study(

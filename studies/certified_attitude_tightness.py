@@ -25,6 +25,7 @@ from optsat.campaign.study import Case, Row, Study
 from optsat.determine import certify_attitude
 from optsat.errors import OptsatError
 from optsat.models.draws import directions, rotations, tilted
+from optsat.plots.svg_file import write_svg
 from optsat.problems.certified_attitude import CertifiedAttitude
 
 VECTORS = (2, 3, 4, 5, 6)
@@ -137,7 +138,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     axes.set(xlabel="number of vectors", ylabel="guaranteed bound / brute-force radius [-]")
     axes.set_title("Exact for two vectors; cells close most of the gap for more")
     axes.legend(frameon=False)
-    canvas.savefig(path)
+    write_svg(canvas, path)
 
 
 study = Study(

@@ -204,6 +204,10 @@ RULES: dict[str, tuple[Rule, Tree]] = {
         only("plots", {"estimators", "records", "arrays", "errors"}),
         {"optsat.plots.bound_figure": "from optsat.files import write_atomically"},
     ),
+    "report imports only campaign, plots, arrays and errors": (
+        only("report", {"campaign", "plots", "arrays", "errors"}),
+        {"optsat.report.html_report": "from optsat.records.record import Record"},
+    ),
     "attitude imports only arrays and errors": (
         only("attitude", {"arrays", "errors"}),
         {"optsat.attitude.dcm": "from optsat.port import Port"},

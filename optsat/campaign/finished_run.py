@@ -28,7 +28,7 @@ class FinishedRun:
     metrics : figures; NaN where one was not finite
     columns : scalars of the cases that ran, the case's number first, each (cases that ran,)
     digests : size and SHA-256 of each of its files
-    chunk_size, provenance : of the start; no result depends on them
+    provenance : of the start; no result depends on it
     """
 
     path: Path
@@ -39,7 +39,6 @@ class FinishedRun:
     failures: tuple[Failure, ...]
     columns: Mapping[str, NDArray[Any]]
     digests: Mapping[str, Mapping[str, Any]]
-    chunk_size: int
     provenance: Mapping[str, Any]
 
     @property
@@ -101,7 +100,6 @@ def read_run(path: Path) -> FinishedRun:
         end.failures,
         _columns(path / SUMMARY),
         end.digests,
-        start.chunk_size,
         start.provenance,
     )
 
@@ -110,13 +108,12 @@ def read_run(path: Path) -> FinishedRun:
 class _Start:
     run: str
     identity: Identity
-    chunk_size: int
     provenance: Mapping[str, Any]
 
 
 def _start(document: Any) -> _Start:
     identity = Identity(**document["identity"])
-    return _Start(str(document["run"]), identity, int(document["chunk_size"]), dict(document["provenance"]))
+    return _Start(str(document["run"]), identity, dict(document["provenance"]))
 
 
 @dataclass(frozen=True)

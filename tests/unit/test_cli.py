@@ -18,8 +18,8 @@ TOY = Path(__file__).parent / "campaign" / "toy_study.py"
 COMMANDS: tuple[list[str], ...] = (
     [],
     *(["demo"], ["attitude"], ["verify"], ["simulate"]),
-    *(["study"], ["study", "list"], ["study", "run"]),
-    *(["export"], ["bench"], ["doctor"]),
+    *(["study"], ["study", "list"], ["study", "run"], ["study", "report"]),
+    *(["export"], ["bench"], ["cache"], ["cache", "show"], ["cache", "clean"], ["doctor"]),
 )
 
 
@@ -60,7 +60,9 @@ def test_every_command_has_help_with_an_example(command: list[str]) -> None:
 
 def test_the_list_of_commands_above_is_complete() -> None:
     listed = {
-        name for command in ([], ["study"]) for name in re.findall(r"^  (\w+)  ", invoke(*command, "-h").stdout, re.M)
+        name
+        for command in ([], ["study"], ["cache"])
+        for name in re.findall(r"^  (\w+)  ", invoke(*command, "-h").stdout, re.M)
     }
     assert listed - {"command"} == {command[-1] for command in COMMANDS if command}
 

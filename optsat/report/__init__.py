@@ -1,0 +1,1 @@
+"""Report: the folder of a complete run as a page that people read."""

@@ -60,7 +60,14 @@ def test_headers_are_of_use_in_cpp_11(compiler: str, tmp_path: Path) -> None:
         "    const bool good = newton_root(&in, &out, &memory) == OS_OK && out.root[1] > 2.99\n"
         "        && covariance_init(&state, nullptr) == OS_E_NULL;\n"
         "    const os_real_t wxyz[4] = {1.0, 0.0, 0.0, 0.0};\n    os_real_t xyzw[4];\n"
-        "    os_quaternion_from_scalar_first(wxyz, xyzw);\n    return (good && xyzw[3] > 0.5) ? 0 : 1;\n}\n"
+        "    os_quaternion_from_scalar_first(wxyz, xyzw);\n"
+        "    const os_real_t by_columns[6] = {1.0, 4.0, 2.0, 5.0, 3.0, 6.0};\n    os_real_t by_rows[6], again[6];\n"
+        "    os_matrix_from_columns(by_columns, 2U, 3U, by_rows);\n    os_matrix_to_columns(by_rows, 2U, 3U, again);\n"
+        "    bool same = xyzw[3] > 0.5;\n"
+        "    for (uint32_t k = 0U; k < 6U; k++) {\n"
+        "        same = same && by_rows[k] < k + 1.5 && by_rows[k] > k + 0.5 && again[k] - by_columns[k] < 0.5\n"
+        "            && by_columns[k] - again[k] < 0.5;\n    }\n"
+        "    return (good && same) ? 0 : 1;\n}\n"
     )
     strict = ["-std=c++11", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror"]
     run_tool([command, *strict, "client.cpp", "newton_root.o", "covariance_step.o", "-lm", "-o", "client"], tmp_path)

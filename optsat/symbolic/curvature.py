@@ -138,8 +138,11 @@ def shapes_of(function: Any, p: Array, lower: Array, upper: Array) -> list[Shape
         raise InputError(f"{function.name()} is too large for an analysis of its curvature.")
     rules = _Rules(lower, upper)
     shapes: list[Shape] = []
+    # of each node, which node it is a whole power of: x^3 arrives as x * (x * x)
+    powers: list[tuple[int, int]] = []
     with np.errstate(all="ignore"):
-        for node in program.nodes:
+        for index, node in enumerate(program.nodes):
+            power = (index, 1)
             if isinstance(node, Constant):
                 shapes.append(rules.constant(node.value))
             elif isinstance(node, Input):
@@ -149,10 +152,26 @@ def shapes_of(function: Any, p: Array, lower: Array, upper: Array) -> list[Shape
                 operands = node.operands
                 same = len(operands) == 2 and operands[0] == operands[1]
                 shapes.append(rules.applied(node.code, [shapes[i] for i in operands], same))
+                power = _power_of(node.code, [powers[i] for i in operands], index)
+                if shapes[-1].rest is Rest.UNKNOWN and power[0] != index:
+                    shapes[-1] = rules.power(shapes[power[0]], float(power[1]))
+            powers.append(power)
     results = [rules.constant(0.0)] * function.size1_out(0)
     for row, node_index in zip(program.outputs[0].row, program.results[0], strict=True):
         results[row] = shapes[node_index]
     return results
+
+
+def _power_of(code: str, operands: list[tuple[int, int]], index: int) -> tuple[int, int]:
+    """Return base node and whole exponent of an operation, itself and 1 where it is no power."""
+    (base, exponent), (other, more) = operands[0], operands[-1]
+    if code == "SQ":
+        return base, 2 * exponent
+    if code == "INV":
+        return base, -exponent
+    if code == "MUL" and base == other and exponent + more:
+        return base, exponent + more
+    return index, 1
 
 
 class _Rules:

@@ -80,7 +80,7 @@ def test_the_table_from_the_usual_starts() -> None:
 
 @pytest.mark.parametrize("reference", REFERENCE, ids=lambda reference: reference.name)
 def test_the_table_from_many_starts(reference: ReferenceProblem) -> None:
-    found = attained(reference, 16)
+    found = attained(reference, 8)
     check_honest(reference, reference.problem(), found)
     assert reached(reference, found.answer.factor)
     assert found.proof is Proof.GLOBAL if reference.convex else found.proof is Proof.STATIONARY

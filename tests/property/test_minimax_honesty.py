@@ -19,7 +19,7 @@ from optsat.solution import Proof, Termination
 from optsat.solve import solve
 from optsat.solvers import SOLVERS
 
-INSTANCES = int(os.environ.get("OPTSAT_HONESTY_INSTANCES", "40"))
+INSTANCES = int(os.environ.get("OPTSAT_HONESTY_INSTANCES", "25"))
 ENGINES = [each for each in SOLVERS if each.accepts(convex_problem(np.random.default_rng(0)).problem.form)]
 
 

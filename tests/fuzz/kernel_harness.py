@@ -1,6 +1,7 @@
 """Random symbolic graphs, and the ways to run them: CasADi's virtual machine, compiled C, NumPy printed and direct."""
 
 import ctypes
+import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -23,6 +24,8 @@ PLAIN = (0.1, np.pi, 3.0, -7.25, 1.0, -1.0, 0.5, 2.0)
 CONSTANTS = (*SPECIAL, *PLAIN)
 CONSTANTS_FLOAT = (0.0, -0.0, np.nan, np.inf, -np.inf, *PLAIN)
 COMPILERS = ("gcc", "clang")
+GRAPHS = int(os.environ.get("OPTSAT_FUZZ_GRAPHS", "50"))
+"""Random graphs of each kind; a campaign sets OPTSAT_FUZZ_GRAPHS to 500 or more."""
 
 
 def compiler_named(name: str) -> Compiler:

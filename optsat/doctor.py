@@ -3,7 +3,6 @@
 import enum
 import os
 import platform
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import metadata
@@ -53,7 +52,7 @@ def examine() -> list[Finding]:
         *(_extra(extra, name) for extra, names in EXTRAS.items() for name in names),
         Finding("processor", Health.OK, f"{platform.machine()}, {_usable_cores()} cores usable"),
         Finding("threads", Health.OK, _threads()),
-        _compiler(),
+        *_kernels(),
         *(check() for check in SELF_CHECKS),
     ]
 
@@ -89,9 +88,14 @@ def _threads() -> str:
     return ", ".join(said) or "as the libraries choose (OMP_NUM_THREADS is not set)"
 
 
-def _compiler() -> Finding:
-    found = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-    return Finding("C compiler", Health.OK if found else Health.ABSENT, found or "not found; not needed")
+def _kernels() -> list[Finding]:
+    try:
+        from optsat.kernels.health import examine_kernels
+
+        facts = examine_kernels()
+    except (ImportError, RuntimeError) as error:
+        return [Finding("kernels", Health.BROKEN, str(error))]
+    return [Finding(fact.subject, Health(fact.state), fact.says) for fact in facts]
 
 
 def _casadi_computes() -> Finding:

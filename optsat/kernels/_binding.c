@@ -15,7 +15,7 @@ enum {
     MAX_PORTS = 64,
     MAX_AXES = 2,
     SMALL_BATCH = 16, /* below, letting other threads run costs more than it gives */
-    CHUNK = 1024      /* samples that are checked and computed while they are in the cache */
+    CHUNK = 256       /* samples that are checked and computed while they are in the cache */
 };
 
 static const char KERNEL[] = "optsat.kernels.kernel";
@@ -69,36 +69,52 @@ static void kernel_free(PyObject *capsule)
     }
 }
 
-/* An exponent of all ones, of NaN and infinity, carries into the sign when one is added to it. */
-#define DEFINE_ALL_FINITE(NAME, WORD, EXPONENT, ONE)                      \
-    static int NAME(const char *memory, Py_ssize_t count)                 \
-    {                                                                     \
-        WORD carried[8] = { 0 };                                          \
-        WORD bits[8];                                                     \
-        Py_ssize_t i = 0;                                                 \
-        for (; i + 8 <= count; i += 8) {                                  \
-            memcpy(bits, memory + (size_t)i * sizeof(WORD), sizeof bits); \
-            for (int lane = 0; lane < 8; ++lane) {                        \
-                carried[lane] |= (bits[lane] & (EXPONENT)) + (ONE);       \
-            }                                                             \
-        }                                                                 \
-        for (; i < count; ++i) {                                          \
-            memcpy(bits, memory + (size_t)i * sizeof(WORD), sizeof(WORD)); \
-            carried[0] |= (bits[0] & (EXPONENT)) + (ONE);                 \
-        }                                                                 \
-        for (int lane = 1; lane < 8; ++lane) {                            \
-            carried[0] |= carried[lane];                                  \
-        }                                                                 \
-        return (carried[0] >> (8U * sizeof(WORD) - 1U)) == 0U;            \
+/* An exponent of all ones, of NaN and infinity, carries into the sign when one is added to it. The words stand side by
+   side in vectors of 16 bytes, which any processor has; plain loops over them would take ten times as long. */
+#if defined(__GNUC__)
+typedef uint64_t doubles_t __attribute__((vector_size(16)));
+typedef uint32_t floats_t __attribute__((vector_size(16)));
+#else
+typedef uint64_t doubles_t;
+typedef uint32_t floats_t;
+#endif
+
+#define DEFINE_ALL_FINITE(NAME, WORD, LANES, EXPONENT, ONE)                \
+    static int NAME(const char *memory, size_t count)                      \
+    {                                                                      \
+        LANES carried[4] = { { 0 } };                                      \
+        LANES bits[4];                                                     \
+        WORD words[4U * sizeof(LANES) / sizeof(WORD)];                     \
+        const size_t block = 4U * sizeof(LANES) / sizeof(WORD);            \
+        WORD rest = 0U;                                                    \
+        size_t i = 0;                                                      \
+        for (; i + block <= count; i += block) {                           \
+            memcpy(bits, memory + i * sizeof(WORD), sizeof bits);          \
+            carried[0] |= (bits[0] & (EXPONENT)) + (ONE);                  \
+            carried[1] |= (bits[1] & (EXPONENT)) + (ONE);                  \
+            carried[2] |= (bits[2] & (EXPONENT)) + (ONE);                  \
+            carried[3] |= (bits[3] & (EXPONENT)) + (ONE);                  \
+        }                                                                  \
+        for (; i < count; ++i) {                                           \
+            WORD word;                                                     \
+            memcpy(&word, memory + i * sizeof(WORD), sizeof word);         \
+            rest |= (word & (EXPONENT)) + (ONE);                           \
+        }                                                                  \
+        memcpy(words, carried, sizeof words);                              \
+        for (size_t k = 0; k < block; ++k) {                               \
+            rest |= words[k];                                              \
+        }                                                                  \
+        return (rest >> (8U * sizeof(WORD) - 1U)) == 0U;                   \
     }
 
-DEFINE_ALL_FINITE(all_finite_double, uint64_t, UINT64_C(0x7FF0000000000000), UINT64_C(0x0010000000000000))
-DEFINE_ALL_FINITE(all_finite_float, uint32_t, UINT32_C(0x7F800000), UINT32_C(0x00800000))
+DEFINE_ALL_FINITE(
+    all_finite_double, uint64_t, doubles_t, UINT64_C(0x7FF0000000000000), UINT64_C(0x0010000000000000))
+DEFINE_ALL_FINITE(all_finite_float, uint32_t, floats_t, UINT32_C(0x7F800000), UINT32_C(0x00800000))
 
 static int all_finite(const void *memory, Py_ssize_t count, int is_float)
 {
     const char *from = (const char *)memory;
-    return is_float ? all_finite_float(from, count) : all_finite_double(from, count);
+    return is_float ? all_finite_float(from, (size_t)count) : all_finite_double(from, (size_t)count);
 }
 
 /* Contiguous native reals, aligned; 0 without an exception where it is anything else. */
@@ -480,7 +496,7 @@ static int find_functions(kernel_t *kernel, const char *path, const char *name, 
         PyErr_Format(PyExc_OSError, "%s holds no kernel %s", path, name);
         return -1;
     }
-    if (*found_abi != abi || *width < 1U || *width > (uint32_t)CHUNK) {
+    if (*found_abi != abi || *width < 1U || *width > 64U) {
         PyErr_Format(PyExc_OSError, "%s speaks ABI %u, not %u", path, (unsigned int)*found_abi, abi);
         return -1;
     }

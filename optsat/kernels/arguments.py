@@ -59,6 +59,17 @@ def shared_length(function: str, lengths: Mapping[str, int]) -> int:
     return next(iter(lengths.values()))
 
 
+def check_threads(function: str, threads: int) -> None:
+    """Refuse what is no number of threads.
+
+    Raises
+    ------
+    InputError : it is no whole number from 1.
+    """
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise InputError(f"{function}.batch: `threads` must be a whole number from 1, got {threads!r}.")
+
+
 @dataclass(frozen=True)
 class Arguments:
     """The checks of one kernel's arguments."""

@@ -42,7 +42,7 @@ def cached_binding() -> Any:
     import sysconfig
 
     text = resources.files("optsat.kernels").joinpath("_binding.c").read_text(encoding="utf-8")
-    record = KernelRecord("_binding", "double", (), (), False, (), 0, digest_of(text))
+    record = KernelRecord("_binding", "double", (), (), text=digest_of(text))
     extra = [f"-I{sysconfig.get_paths()['include']}"]
     if sys.platform == "darwin":
         extra += ["-undefined", "dynamic_lookup"]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from optsat.kernels.arguments import Arguments, Reals
-from optsat.kernels.form import Kind, exact_arrays, first_not_finite, unpacked
+from optsat.kernels.form import Kind, Sample, first_not_finite, unpacked
 from optsat.kernels.record import KernelRecord
 from optsat.port import Port
 
@@ -25,11 +25,11 @@ class CasadiForm:
 
     def call(self, *args: Any, **kwargs: Any) -> Any:
         """Return the results of one sample."""
-        arrays = exact_arrays(self._arguments, args, kwargs)
         # a buffer is one workspace: each thread has its own
         own = self._of_thread.__dict__ or self._prepared()
-        for kept, places, array in zip(own["inputs"], self._places_in, arrays, strict=True):
-            kept[...] = array.reshape(-1) if places is None else array.reshape(-1)[places]
+        own["sample"].take(self._arguments, args, kwargs)
+        for kept, places, array in own["moved"]:
+            kept[...] = array[places]
         own["trigger"]()
         results = []
         for port, kept, places in zip(self._record.outputs, own["outputs"], self._places_out, strict=True):
@@ -62,7 +62,13 @@ class CasadiForm:
     def _prepared(self) -> dict[str, Any]:
         function = self._function
         buffer, trigger = function.buffer()
-        inputs = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        sample = Sample(self._record.inputs, "double")
+        inputs, moved = [], []
+        for places, array in zip(self._places_in, sample.arrays, strict=True):
+            flat = array.reshape(-1)
+            inputs.append(flat if places is None else np.zeros(len(places)))
+            if places is not None:
+                moved.append((inputs[-1], places, flat))
         outputs = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
         for arrays, give in ((inputs, buffer.set_arg), (outputs, buffer.set_res)):
             for k, array in enumerate(arrays):
@@ -70,7 +76,7 @@ class CasadiForm:
                 if array.size:
                     give(k, memoryview(array))  # type: ignore[arg-type, unused-ignore]
         own = self._of_thread.__dict__
-        own["inputs"], own["outputs"], own["trigger"], own["buffer"] = inputs, outputs, trigger, buffer
+        own.update(sample=sample, inputs=inputs, moved=moved, outputs=outputs, trigger=trigger, buffer=buffer)
         return own
 
 

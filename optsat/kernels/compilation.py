@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from optsat.kernels import cache
+from optsat.kernels.entry import Entry
 from optsat.kernels.fingerprint import Fingerprint, fingerprint, tuned
 from optsat.kernels.folders import writable_folders
 from optsat.kernels.lowering import LARGE
@@ -33,7 +34,7 @@ def compiled(
     bind: Callable[[str, KernelRecord], T],
     extra: Sequence[str] = (),
     compiler: Compiler | None = None,
-) -> tuple[T, cache.Entry]:
+) -> tuple[T, Entry]:
     """Return what `bind` makes of the library of a C text, and its entry in the cache, where it is kept from now on.
 
     record : what is known before; extra : more flags; compiler : the one that is found unless given

@@ -1,4 +1,4 @@
-"""ctypes form: a compiled kernel where the binding could not be built; a call costs two to three times as much."""
+"""ctypes form: a compiled kernel where the binding could not be built; a call costs several times as much."""
 
 import threading
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from optsat.kernels.arguments import Arguments, Reals, data_type
-from optsat.kernels.form import Kind, exact_arrays, unpacked
+from optsat.kernels.form import Kind, Sample, unpacked
 from optsat.kernels.record import KernelRecord
 from optsat.kernels.unit import ABI
 
@@ -41,10 +41,8 @@ class CtypesForm:
 
     def call(self, *args: Any, **kwargs: Any) -> Any:
         """Return the results of one sample."""
-        arrays = exact_arrays(self._arguments, args, kwargs)
         own = self._of_thread.__dict__ or self._prepared()
-        for kept, array in zip(own["inputs"], arrays, strict=True):
-            kept[...] = array
+        own["sample"].take(self._arguments, args, kwargs)
         status = self._call_address(own["in"], own["out"])
         return unpacked(self._record, [result.copy() for result in own["outputs"]], status)
 
@@ -77,10 +75,10 @@ class CtypesForm:
         import ctypes
 
         kind, record = data_type(self._record.real), self._record
-        inputs = [np.zeros(port.shape, kind) for port in record.inputs]
+        sample = Sample(record.inputs, record.real)
         outputs = [np.zeros(port.shape, kind) for port in record.outputs]
         own = self._of_thread.__dict__
-        own["inputs"], own["outputs"] = inputs, outputs
-        own["in"] = (ctypes.c_void_p * max(1, len(inputs)))(*(array.ctypes.data for array in inputs))
+        own["sample"], own["outputs"] = sample, outputs
+        own["in"] = (ctypes.c_void_p * max(1, len(sample.arrays)))(*(array.ctypes.data for array in sample.arrays))
         own["out"] = (ctypes.c_void_p * len(outputs))(*(array.ctypes.data for array in outputs))
         return own

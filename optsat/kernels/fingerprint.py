@@ -5,7 +5,9 @@ import json
 import os
 import platform
 import subprocess
+import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib import resources
@@ -127,36 +129,38 @@ def _candidates() -> list[tuple[str, ...]]:
 
 
 def _refusal(compiler: Compiler, library: Path) -> str:
-    import ctypes
-
-    probe = ctypes.CDLL(str(library)).os_probe
-    probe.restype = ctypes.c_uint64
-    if (found := probe()) == PROBE:
+    # in a process of its own: the mere loading of code made with -ffast-math changes the arithmetic of all the rest
+    program = "import ctypes, sys; f = ctypes.CDLL(sys.argv[1]).os_probe; f.restype = ctypes.c_uint64; print(f())"
+    said = _run([sys.executable, "-I", "-S", "-c", program, str(library)])
+    if said.strip() == str(PROBE):
         return ""
     return (
-        f"{compiler} does not compute as IEEE 754 asks (its probe gives {found:016x}, not {PROBE:016x}), so kernels "
+        f"{compiler} does not compute as IEEE 754 asks (its probe says {said.strip()[-200:]}, not {PROBE}), so kernels "
         "would return other numbers. Take flags that change results out of CC and OPTSAT_CFLAGS, or let CC name "
         "another compiler."
     )
 
 
 def _said(compiler: Compiler, *arguments: str) -> str:
-    environment = {name: os.environ[name] for name in PASSED_ON if name in os.environ} | {"LC_ALL": "C"}
     try:
-        done = subprocess.run(
-            [*compiler.command, *arguments],
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            encoding="utf-8",
-            errors="replace",
-            timeout=_TIME_LIMIT,
-            check=False,
-        )
+        return _run([*compiler.command, *arguments])
     except (OSError, subprocess.TimeoutExpired) as error:
         raise CompilationError(f"{compiler} cannot be run: {error}.") from None
+
+
+def _run(command: Sequence[str]) -> str:
+    done = subprocess.run(
+        command,
+        env={name: os.environ[name] for name in PASSED_ON if name in os.environ} | {"LC_ALL": "C"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+        timeout=_TIME_LIMIT,
+        check=False,
+    )
     return done.stdout
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from optsat.kernels.arguments import Arguments, Reals, data_type
 from optsat.kernels.record import KernelRecord
 from optsat.kernels.status import Status
+from optsat.kernels.unit import Real
 from optsat.port import Port
 
 Kind = Literal["extension", "cached extension", "ctypes", "casadi", "python"]
@@ -22,10 +23,12 @@ class Form(Protocol):
     @property
     def kind(self) -> Kind:
         """Its name."""
+        ...
 
     @property
     def call(self) -> Callable[..., Any]:
         """Arguments by position or by name to fresh results of one sample, and the status where it has one."""
+        ...
 
     def run(
         self, in_tiles: bool, begin: int, end: int, count: int, arrays: tuple[Reals, ...], statuses: Reals | None
@@ -34,6 +37,7 @@ class Form(Protocol):
 
         Returns how many failed, and which argument is not finite, or -1: results are then of no use.
         """
+        ...
 
 
 def unpacked(record: KernelRecord, results: Sequence[Any], status: int) -> Any:
@@ -44,19 +48,34 @@ def unpacked(record: KernelRecord, results: Sequence[Any], status: int) -> Any:
     return found[0] if len(found) == 1 else tuple(found)
 
 
-def exact_arrays(arguments: Arguments, args: Sequence[Any], kwargs: dict[str, Any]) -> tuple[Reals, ...]:
-    """Return the arguments of one sample as finite arrays, without a copy where they are such already."""
-    inputs, kind = arguments.inputs, data_type(arguments.real)
-    ready = (
-        not kwargs
-        and len(args) == len(inputs)
-        and all(
-            type(value) is np.ndarray and value.dtype == kind and value.shape == port.shape
-            for port, value in zip(inputs, args, strict=True)
-        )
-        and all(np.isfinite(value).all() for value in args)
-    )
-    return tuple(args) if ready else arguments.sample(args, kwargs)
+class Sample:
+    """The arguments of one sample in a row, in memory that is taken once: addresses and arrays cost more than a call.
+
+    Calls of several threads need one each.
+    """
+
+    def __init__(self, inputs: Sequence[Port], real: Real) -> None:
+        self._type = data_type(real)
+        self.row = np.zeros(sum(port.size for port in inputs), self._type)
+        parts = np.split(self.row, np.cumsum([port.size for port in inputs])[:-1]) if inputs else []
+        self.arrays = [part.reshape(port.shape) for port, part in zip(inputs, parts, strict=True)]
+
+    def take(self, arguments: Arguments, args: Sequence[Any], kwargs: dict[str, Any]) -> None:
+        """Copy the arguments here, checked; a refusal is that of `Arguments.sample`."""
+        if not (kwargs or len(args) != len(self.arrays)) and self._fit(args):
+            for kept, value in zip(self.arrays, args, strict=True):
+                kept[...] = value
+            if np.isfinite(self.row).all():
+                return
+        for kept, value in zip(self.arrays, arguments.sample(args, kwargs), strict=True):
+            kept[...] = value
+
+    def _fit(self, args: Sequence[Any]) -> bool:
+        for kept, value in zip(self.arrays, args, strict=True):
+            # of the exact type: a masked array would lose its mask
+            if type(value) is not np.ndarray or value.dtype is not self._type or value.shape != kept.shape:
+                return False
+        return True
 
 
 def first_not_finite(inputs: Sequence[Port], arrays: Sequence[Reals], begin: int, end: int) -> int:

@@ -104,7 +104,7 @@ def _files(wanted: Request) -> list[str]:
 
 def _request_name(wanted: Request) -> str:
     # two installations have files of their own
-    known = [wanted.definition, wanted.parameters, wanted.real, str(ABI), os.path.dirname(__file__)]
+    known = [wanted.definition, wanted.parameters, wanted.real, wanted.math, str(ABI), os.path.dirname(__file__)]
     return hashlib.sha256("\n".join(known).encode()).hexdigest()
 
 

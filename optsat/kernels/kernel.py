@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from optsat.errors import InputError, OptsatError
-from optsat.kernels.arguments import Arguments, Reals, data_type
+from optsat.kernels.arguments import Arguments, Reals, check_threads, data_type
 from optsat.kernels.form import Form, Kind
 from optsat.kernels.record import KernelRecord
 from optsat.kernels.request import Request
@@ -53,6 +53,11 @@ class Kernel:
         return self._form.kind
 
     @property
+    def is_compiled(self) -> bool:
+        """Whether a C compiler made it."""
+        return bool(self.record.key)
+
+    @property
     def c_text(self) -> str:
         """The C text that it was, or would be, compiled from.
 
@@ -86,8 +91,7 @@ class Kernel:
         """
         if layout not in ("rows", "tiles"):
             raise InputError(f"{self.record.name}.batch: `layout` must be 'rows' or 'tiles', got {layout!r}.")
-        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-            raise InputError(f"{self.record.name}.batch: `threads` must be a whole number from 1, got {threads!r}.")
+        check_threads(self.record.name, threads)
         in_tiles = layout == "tiles"
         count, arrays = checked_tiles(self.record, args, kwargs) if in_tiles else self._arguments.batch(args, kwargs)
         width = self.record.width if in_tiles else 1
@@ -205,10 +209,10 @@ class Kernel:
     def __reduce__(self) -> tuple[Any, ...]:
         from optsat.kernels.open_kernel import reopen
 
-        key, text = self.record.key, self.record.text
+        key, source = self.record.key, self.record.source
         if isinstance(self._origin, Request):
-            return reopen, (key, text, self._origin, None)
-        return reopen, (key, text, None, (self.record, self.c_text) if key else self._origin)
+            return reopen, (key, source, self._origin, None)
+        return reopen, (key, source, None, (self.record, self.c_text) if key else self._origin)
 
     def __repr__(self) -> str:
         return f"<kernel {self.record}, {self.form}>"

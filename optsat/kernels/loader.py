@@ -5,12 +5,13 @@ from optsat.kernels.binding import find_binding
 from optsat.kernels.bound_form import BoundForm
 from optsat.kernels.compilation import compiled
 from optsat.kernels.ctypes_form import CtypesForm
+from optsat.kernels.entry import Entry
 from optsat.kernels.form import Form
 from optsat.kernels.processor import check_denormals
 from optsat.kernels.record import KernelRecord
 
 
-def load_form(key: str) -> tuple[Form, cache.Entry] | None:
+def load_form(key: str) -> tuple[Form, Entry] | None:
     """Return a kernel of the cache by its key, None where it is not there or made for another processor.
 
     Raises
@@ -21,7 +22,7 @@ def load_form(key: str) -> tuple[Form, cache.Entry] | None:
     return cache.load(key, bound)
 
 
-def compile_form(record: KernelRecord, text: str) -> tuple[Form, cache.Entry]:
+def compile_form(record: KernelRecord, text: str) -> tuple[Form, Entry]:
     """Return a kernel of a C text, compiled unless the cache holds it.
 
     record : name, real, ports, status, libm and operations

@@ -11,9 +11,11 @@ import numpy as np
 from optsat.errors import OptsatError
 
 # words of /proc/cpuinfo that name no instruction a compiler could use
-_NO_INSTRUCTIONS = """apic arat constant_tsc cpuid fsrm hypervisor lahf_lm mca mce mtrr nonstop_tsc nopl nx pae pat pge pse pse36
-    rep_good smap smep syscall topoext tsc tsc_adjust tsc_deadline_timer tsc_known_freq umip vme wbnoinvd
-    x2apic"""
+_NO_INSTRUCTIONS = """
+    apic arat constant_tsc cpuid fsrm hypervisor lahf_lm mca mce mtrr nonstop_tsc nopl nx pae pat pge pse
+    pse36 rep_good smap smep syscall topoext tsc tsc_adjust tsc_deadline_timer tsc_known_freq umip vme
+    wbnoinvd x2apic
+"""
 
 
 class DenormalsFlushedError(OptsatError):
@@ -49,11 +51,10 @@ def c_library() -> str:
         return f"{platform.system()} {platform.release()}"
 
 
-def lane_width() -> int:
-    """Return how many doubles this processor works on at once: 8, 4 or 2."""
-    if "avx512f" in features():
-        return 8
-    return 4 if "avx" in features() else 2
+def lane_width(real: str) -> int:
+    """Return how many doubles, or floats, this processor works on at once: 8, 4 or 2, or twice that."""
+    doubles = 8 if "avx512f" in features() else 4 if "avx" in features() else 2
+    return 2 * doubles if real == "float" else doubles
 
 
 def check_denormals() -> None:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from optsat.kernels.arguments import Arguments, Reals
-from optsat.kernels.form import Kind, exact_arrays, first_not_finite, unpacked
+from optsat.kernels.form import Kind, first_not_finite, unpacked
 from optsat.kernels.record import KernelRecord
 from optsat.kernels.source import Twin
 from optsat.kernels.status import Status
@@ -23,7 +23,7 @@ class PythonForm:
 
     def call(self, *args: Any, **kwargs: Any) -> Any:
         """Return the results of one sample."""
-        status, results = self._computed(exact_arrays(self._arguments, args, kwargs))
+        status, results = self._computed(self._arguments.sample(args, kwargs))
         return unpacked(self._record, results, status)
 
     def run(

@@ -12,7 +12,8 @@ from optsat.port import Port
 class KernelRecord:
     """Ports and origin of one compiled kernel.
 
-    key : SHA-256 over text, flags, compiler, target, C library and ABI; text : SHA-256 of the C text
+    source : SHA-256 of the C text for one sample at a time, the same on every machine; text : of the C text compiled
+    key : SHA-256 over text, flags, compiler, target, C library and ABI
     library : SHA-256 of the compiled library; empty where none is, as is the key
     width : samples in a tile; has_tiles : whether the kernel computes on tiles
     libm : C functions used whose last bits depend on the machine; none means the same bits everywhere
@@ -24,10 +25,11 @@ class KernelRecord:
     real: Real
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
-    has_status: bool
-    libm: tuple[str, ...]
-    operations: int
-    text: str
+    has_status: bool = False
+    libm: tuple[str, ...] = ()
+    operations: int = 0
+    source: str = ""
+    text: str = ""
     key: str = ""
     library: str = ""
     width: int = 1

@@ -9,6 +9,7 @@ from typing import Any
 
 from optsat.errors import InputError, nearest_name
 from optsat.kernels.definition import Definition
+from optsat.kernels.elementary import Math
 from optsat.kernels.source import KernelSource
 from optsat.kernels.unit import Real
 
@@ -17,11 +18,12 @@ _NAME = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 @dataclass(frozen=True)
 class Request:
-    """The defining function as "module:function", its parameters as JSON with sorted names, and the numbers."""
+    """The defining function as "module:function", its parameters as JSON with sorted names, numbers and functions."""
 
     definition: str
     parameters: str
     real: Real
+    math: Math
 
     def build(self) -> Definition | KernelSource:
         """Import the module and call the function.
@@ -47,7 +49,7 @@ class Request:
         return found
 
 
-def request(definition: str, real: Real, parameters: Mapping[str, Any]) -> Request:
+def request(definition: str, real: Real, math: Math, parameters: Mapping[str, Any]) -> Request:
     """Return the request for a kernel.
 
     Raises
@@ -59,15 +61,13 @@ def request(definition: str, real: Real, parameters: Mapping[str, Any]) -> Reque
         raise InputError(f"A kernel is defined by 'module:function', got {definition!r}.")
     if definition.startswith("__main__:"):
         raise InputError(f"{definition}: a script cannot be imported elsewhere. Move the function to a module.")
-    if real not in ("double", "float"):
-        raise InputError(f"`real` must be 'double' or 'float', got {real!r}.")
     try:
         text = json.dumps(parameters, sort_keys=True, default=_plain)
     except (TypeError, ValueError):
         raise InputError(
             f"{definition}: its parameters must be numbers, texts, lists or arrays, got {dict(parameters)!r}."
         ) from None
-    return Request(definition, text, real)
+    return Request(definition, text, real, math)
 
 
 def _plain(value: Any) -> Any:

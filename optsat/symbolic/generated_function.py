@@ -1,14 +1,19 @@
-"""Generated function: one symbolic definition, called by sample or by batch, with exact Jacobians."""
+"""Generated function: one symbolic definition, called by sample or by batch, compiled, with exact Jacobians."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from optsat.attitude.backend import Value, is_symbolic
-from optsat.errors import InputError, UnknownOptionError, nearest_name
+from optsat.errors import InputError, nearest_name
+from optsat.kernels.arguments import ordered
 from optsat.port import Port
+
+if TYPE_CHECKING:
+    from optsat.kernels.elementary import Math
+    from optsat.kernels.kernel import Kernel
+    from optsat.kernels.unit import Real
+    from optsat.symbolic.evaluation import Evaluation
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -16,13 +21,24 @@ class GeneratedFunction:
     """A CasADi SX function with named ports; make one with `generate`.
 
     Arrays in, arrays out, by position or by name; a single output comes unpacked, several as a tuple. CasADi arguments
-    give CasADi results, so functions compose.
+    give CasADi results, so functions compose. It is computed by CasADi's machine, and by compiled code with the same
+    bits once that pays, see `optsat.symbolic.evaluation`; `kernel` gives the fastest form at once.
     """
 
     name: str
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     casadi: Any
+    _evaluation: "Evaluation" = field(init=False)
+
+    def __post_init__(self) -> None:
+        from optsat.symbolic.evaluation import Evaluation
+
+        object.__setattr__(self, "_evaluation", Evaluation(self.name, self.inputs, self.outputs, self.casadi))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # what was compiled stays here: the cache of the other process has it too
+        return GeneratedFunction, (self.name, self.inputs, self.outputs, self.casadi)
 
     def __call__(self, *args: Value, **kwargs: Value) -> Any:
         """Return the outputs for one sample.
@@ -32,32 +48,54 @@ class GeneratedFunction:
         InputError : an argument is missing, not finite or of the wrong shape; the message names the port.
         UnknownOptionError : a keyword is no port of this function.
         """
-        values = self._ordered(args, kwargs)
-        if is_symbolic(*values):
-            results = self.casadi.call(list(values))
+        if is_symbolic(*args, *kwargs.values()):
+            results = self.casadi.call(ordered(self.name, self.inputs, args, kwargs))
             return results[0] if len(results) == 1 else tuple(results)
-        columns = [port.sample(self.name, value) for port, value in zip(self.inputs, values, strict=True)]
-        results = self.casadi.call(columns)
-        return _unpacked([p.from_columns(r.full())[0] for p, r in zip(self.outputs, results, strict=True)])
+        return self._evaluation.call(*args, **kwargs)
 
-    def batch(self, *args: Value, **kwargs: Value) -> Any:
-        """Return the outputs (N, *shape) for N samples in one CasADi call; an input without sample axis is shared.
+    def batch(self, *args: Value, threads: int = 1, **kwargs: Value) -> Any:
+        """Return the outputs (N, *shape) for N samples; an input without sample axis is shared.
+
+        threads : how many compute, once it is compiled, at least 1024 samples each
 
         Raises
         ------
         InputError : as for a call; also when no input has a sample axis, or their lengths differ.
         """
-        ordered = zip(self.inputs, self._ordered(args, kwargs), strict=True)
-        arrays = [(port, port.samples(self.name, value)) for port, value in ordered]
-        lengths = {port.name: len(array) for port, array in arrays if array.shape != port.shape}
-        if len(set(lengths.values())) != 1:
-            got = ", ".join(f"`{name}` {length}" for name, length in lengths.items()) or "none"
-            raise InputError(f"{self.name}.batch: the inputs must hold the same number of samples; lengths: {got}.")
-        count = next(iter(lengths.values()))
-        if count == 0:
-            return _unpacked([np.zeros((0, *port.shape)) for port in self.outputs])
-        results = self.casadi.call([port.to_columns(array) for port, array in arrays])
-        return _unpacked([port.from_columns(result.full()) for port, result in zip(self.outputs, results, strict=True)])
+        return self._evaluation.batch(threads, args, kwargs)
+
+    def kernel(self, real: "Real" = "double", math: "Math" = "own") -> "Kernel":
+        """Return it compiled, now unless the cache holds it: microseconds a call, several samples at once in a batch.
+
+        real : "float" computes in single precision
+        math : "own" elementary functions, fast and with the same bits on every machine; "libm" the bits of a call
+
+        Raises
+        ------
+        InputError : an operation or constant that no kernel can have, or too many operations.
+        """
+        from optsat.kernels.open_kernel import make_kernel
+
+        return make_kernel(self, real, math)
+
+    def c_source(self, target: str = "host", real: "Real" = "double", math: "Math" = "own") -> str:
+        """Return it as C99 that needs no other file: `NAME_call` of one sample, `NAME_batch` of many.
+
+        target : "host"; checked C for flight computers is written by `optsat.export.export.export_c`
+
+        Raises
+        ------
+        InputError : another target, or as for `kernel`.
+        """
+        if target != "host":
+            raise InputError(
+                f"{self.name}.c_source: `target` must be 'host', got {target!r}. Flight code has guards, a header and "
+                "a self-test beside it: use optsat.export.export.export_c, or `optsat export`."
+            )
+        from optsat.kernels.open_kernel import source_of
+        from optsat.kernels.unit import library_text
+
+        return library_text(source_of(self, math), real)
 
     def jacobian(self, of: str, wrt: str) -> "GeneratedFunction":
         """Return the exact derivative (of.size, wrt.size) of output `of` by input `wrt`, matrices counted by rows.
@@ -85,22 +123,6 @@ class GeneratedFunction:
         import casadi as ca
 
         return [ca.SX.sym(port.name, port.rows, port.columns) for port in self.inputs]
-
-    def _ordered(self, args: tuple[Value, ...], kwargs: dict[str, Value]) -> list[Value]:
-        names = [port.name for port in self.inputs]
-        if len(args) > len(names):
-            raise InputError(f"{self.name} takes {len(names)} arguments, got {len(args)}: {self!r}.")
-        given = dict(zip(names, args, strict=False))
-        for name, value in kwargs.items():
-            if name not in names:
-                raise UnknownOptionError(f"{self.name} has no input `{name}`.{nearest_name(name, names)}")
-            if name in given:
-                raise InputError(f"{self.name}: `{name}` was given by position and by name.")
-            given[name] = value
-        for port in self.inputs:
-            if port.name not in given:
-                raise InputError(f"{self.name}: input {port} is missing.")
-        return [given[name] for name in names]
 
     def __repr__(self) -> str:
         return f"{self.name}({', '.join(map(str, self.inputs))}) -> {', '.join(map(str, self.outputs))}"
@@ -174,7 +196,3 @@ def _matching(function: str, port: Port, value: Value) -> Value:
     if matrix.shape != (port.rows, port.columns):
         raise InputError(f"{function}: {port} does not match an expression of shape {matrix.shape}.")
     return matrix
-
-
-def _unpacked(results: list[Any]) -> Any:
-    return results[0] if len(results) == 1 else tuple(results)

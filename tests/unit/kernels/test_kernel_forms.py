@@ -12,6 +12,7 @@ from optsat.kernels import interpreted
 from optsat.kernels.kernel import Kernel
 from optsat.kernels.open_kernel import make_kernel
 from optsat.kernels.status import Status
+from optsat.kernels.unit import Real
 
 pytestmark = pytest.mark.filterwarnings("ignore::optsat.kernels.interpreted.CompilerMissing")
 
@@ -239,6 +240,52 @@ def test_forms_agree_on_a_kernel_with_loops(form: str) -> None:
         status, y = twin(np.concatenate([A[k].ravel(), b[k]]))
         assert status == statuses[k]
         np.testing.assert_array_equal(y, [*x[k], ratios[k]])
+
+
+@pytest.mark.parametrize("form", FORMS[:3])
+def test_single_precision(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    use_form(form, monkeypatch)
+    kernel, (x, J, t) = make_kernel(turning(), real="float"), samples(50)
+    exact = make_kernel(turning()).batch(x, J, t)
+    single = [np.asarray(each, np.float32) for each in (x, J, t)]
+    batch = kernel.batch(*single)
+    assert [result.dtype for result in batch] == [np.float32] * 4
+    for one, other in zip(batch, exact, strict=True):
+        np.testing.assert_allclose(one, other, rtol=2e-5, atol=2e-6)
+    for given in ((x, J, t), (x.tolist(), J[:, ::1], single[2])):
+        assert [bits(result) for result in kernel.batch(*given)] == [bits(result) for result in batch]
+    for k in (0, 49):
+        found = kernel(x[k], single[1][k], float(t[k]))
+        assert [bits(result) for result in found] == [bits(result[k]) for result in batch]
+        assert type(found[2]) is np.float32
+        assert found[0].dtype == np.float32
+    tiles = kernel.to_tiles(x, J, t)
+    again = kernel.from_tiles(*kernel.batch(*tiles, layout="tiles"), count=50)
+    assert [bits(result) for result in again] == [bits(result) for result in batch]
+    with pytest.raises(InputError, match=r"turning: `t` holds 1e\+39, which float cannot hold \(at most 3.4e38\)"):
+        kernel(x[0], J[0], 1e39)
+    with pytest.raises(InputError, match=r"`x` holds -1e\+300, which float cannot hold"):
+        kernel.batch(np.where(x == x[3, 1], -1e300, x), J, t)
+    with pytest.raises(InputError, match=r"`J` must be finite \[-\]: row 31 holds inf"):
+        kernel.batch(single[0], np.where(np.arange(50)[:, None, None] == 31, np.float32(np.inf), single[1]), single[2])
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("form", FORMS[:3])
+def test_every_place_is_looked_at(form: str, real: Real, monkeypatch: pytest.MonkeyPatch) -> None:
+    use_form(form, monkeypatch)
+    kernel = make_kernel(solving(), real=real)
+    A, b = (np.asarray(each, np.float32 if real == "float" else np.float64) for each in equations(60))
+    for value in (np.nan, -np.nan, np.inf, -np.inf):
+        for place in range(A.size):
+            bad = A.copy()
+            bad.flat[place] = value
+            with pytest.raises(InputError, match=f"`A` must be finite .*: row {place // 9} holds"):
+                kernel.batch(bad, b)
+    # the largest and the least numbers are finite
+    limits = np.finfo(np.float32 if real == "float" else np.float64)
+    kernel.batch(np.full_like(A, limits.max), np.full_like(b, -limits.max))
+    kernel.batch(np.full_like(A, limits.smallest_subnormal), b)
 
 
 def test_it_travels(kernel: Kernel) -> None:

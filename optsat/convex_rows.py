@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -75,11 +76,17 @@ def convex_rows(form: MinMaxForm) -> ConvexRows | None:
     return ConvexRows(rows, upper, lower)
 
 
-def _shapes(form: MinMaxForm, values: SmoothMap) -> list[Shape] | None:
+def _shapes(form: MinMaxForm, values: SmoothMap) -> tuple[Shape, ...] | None:
     if not isinstance(values, SymbolicMap) or not values.function.is_a("SXFunction"):
         return None
+    return _read(values.function, *(each.tobytes() for each in (values.p, form.lower, form.upper)))
+
+
+# kept with the Function, so that another start, goal or weight needs no second analysis
+@lru_cache(maxsize=64)
+def _read(function: Any, p: bytes, lower: bytes, upper: bytes) -> tuple[Shape, ...] | None:
     try:
-        return shapes_of(values.function, values.p, form.lower, form.upper)
+        return tuple(shapes_of(function, *(np.frombuffer(each) for each in (p, lower, upper))))
     except InputError:
         # an instruction that cannot be read: nothing is claimed
         return None

@@ -135,8 +135,13 @@ def _stencil(here: float, step: float, lower: float, upper: float) -> tuple[tupl
 def no_values(like: SmoothMap, lower: Array, upper: Array) -> SmoothMap:
     """Return the map of x without values, symbolic where `like` is; lower, upper (n,) : bounds of x."""
     if isinstance(like, SymbolicMap):
-        import casadi as ca
-
-        x, p = ca.SX.sym("x", len(lower)), ca.SX.sym("p", 0)
-        return SymbolicMap(ca.Function("nothing", [x, p], [ca.SX(0, 1)]), np.zeros(0))
+        return SymbolicMap(_no_values(len(lower)), np.zeros(0))
     return CallableMap(lambda x: np.zeros(0), 0, lower, upper)
+
+
+# one Function for each size, so that solvers kept with their Functions are found again
+@lru_cache(maxsize=64)
+def _no_values(n: int) -> Any:
+    import casadi as ca
+
+    return ca.Function("nothing", [ca.SX.sym("x", n), ca.SX.sym("p", 0)], [ca.SX(0, 1)])

@@ -10,9 +10,12 @@ from optsat.arrays import Array, Mask
 from optsat.certificates.first_order import FirstOrder
 from optsat.convex_rows import ConvexRows
 from optsat.forms import MinMaxForm
+from optsat.kernels.program import Program
 from optsat.smooth_map import SymbolicMap
 from optsat.symbolic.interval_evaluation import evaluate_over_box
 
+# excess, relative to the factor (at least 1), below which no sharper bound is sought
+_SHARP = 1e-9
 # eigenvalues of the growth below this fraction of the largest count as none
 _FLAT = 1e-9
 # a multiplier below this fraction of the largest is not moved when gradients are balanced
@@ -42,11 +45,12 @@ def dual_bound(form: MinMaxForm, convex: ConvexRows, state: FirstOrder, x: Array
     multipliers = state.multipliers
     if not float(state.rows.weight @ multipliers) > 0:
         return -np.inf
-    return max(
-        factor - _globally(form, convex, state, x, multipliers),
-        factor - _globally(form, convex, state, x, _balanced(convex, state, multipliers)),
-        factor - _locally(form, state, x),
-    )
+    excess = _globally(form, convex, state, x, multipliers)
+    if excess > _SHARP * max(1.0, abs(factor)):
+        excess = min(excess, _globally(form, convex, state, x, _balanced(convex, state, multipliers)))
+    if excess > _SHARP * max(1.0, abs(factor)):
+        excess = min(excess, _locally(form, state, x))
+    return factor - excess
 
 
 def _globally(form: MinMaxForm, convex: ConvexRows, state: FirstOrder, x: Array, multipliers: Array) -> float:
@@ -146,14 +150,15 @@ def _locally(form: MinMaxForm, state: FirstOrder, x: Array) -> float:
     In coordinates y = d / scale, with L(x + d) convex everywhere and >= L(x) + r.y + m |y|^2 / 2 for |y| <= h: if
     m h > 2 |r|, L exceeds L(x) on that sphere, so its minimum lies inside and is not below L(x) - |r|^2 / (2 m).
     """
-    program = _lagrangian_hessian(form)
-    if program is None:
+    objectives, constraints = form.objectives, form.constraints
+    if not isinstance(objectives, SymbolicMap) or not isinstance(constraints, SymbolicMap):
         return np.inf
+    program = _lagrangian_hessian(objectives.function, constraints.function)
     rows, multipliers, n = state.rows, state.multipliers, len(x)
     weights = np.zeros(form.objectives.size)
     np.add.at(weights, form.objective, state.dual[: len(form.weight)] * form.sign)
     others = state.dual[len(form.weight) : len(form.weight) + form.constraints.size]
-    known = np.concatenate((_parameters(form), weights, others))
+    known = np.concatenate((objectives.p, constraints.p, weights, others))
     here = evaluate_over_box(program, [(x, x), (known, known)])[0].reshape(n, n)
     if not np.all(np.isfinite(here)) or np.any(np.diag(here) <= 0):
         return np.inf
@@ -172,26 +177,20 @@ def _locally(form: MinMaxForm, state: FirstOrder, x: Array) -> float:
     return np.inf
 
 
-def _parameters(form: MinMaxForm) -> Array:
-    return np.concatenate([each.p for each in (form.objectives, form.constraints) if isinstance(each, SymbolicMap)])
-
-
-@lru_cache(maxsize=16)
-def _lagrangian_hessian(form: MinMaxForm) -> Any:
+# kept with the Functions, so that another start, goal or parameter finds it ready
+@lru_cache(maxsize=64)
+def _lagrangian_hessian(objectives: Any, constraints: Any) -> Program:
     """Return the program of the Lagrangian's Hessian (n, n), dense, of x and (p, q, weights of F, weights of g)."""
     import casadi as ca
 
     from optsat.kernels.instructions import read_instructions
 
-    objectives, constraints = form.objectives, form.constraints
-    if not isinstance(objectives, SymbolicMap) or not isinstance(constraints, SymbolicMap):
-        return None
-    x = ca.SX.sym("x", len(form.lower))
-    sizes = [len(objectives.p), len(constraints.p), objectives.size, constraints.size]
+    x = ca.SX.sym("x", objectives.size1_in(0))
+    sizes = [objectives.size1_in(1), constraints.size1_in(1), objectives.size1_out(0), constraints.size1_out(0)]
     known = ca.SX.sym("known", sum(sizes))
     p, q, weights, others = ca.vertsplit(known, [0, *np.cumsum(sizes).tolist()])
-    lagrangian = ca.dot(weights, objectives.function(x, p))
-    if constraints.size:
-        lagrangian += ca.dot(others, constraints.function(x, q))
+    lagrangian = ca.dot(weights, objectives(x, p))
+    if sizes[3]:
+        lagrangian += ca.dot(others, constraints(x, q))
     hessian = ca.densify(ca.hessian(lagrangian, x)[0])
     return read_instructions(ca.Function("hessian", [x, known], [hessian]))

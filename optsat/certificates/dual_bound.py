@@ -43,8 +43,6 @@ def dual_bound(form: MinMaxForm, convex: ConvexRows, state: FirstOrder, x: Array
     """
     factor = form.factor(form.objectives.values(x))
     multipliers = state.multipliers
-    if not float(state.rows.weight @ multipliers) > 0:
-        return -np.inf
     excess = _globally(form, convex, state, x, multipliers)
     if excess > _SHARP * max(1.0, abs(factor)):
         excess = min(excess, _globally(form, convex, state, x, _balanced(convex, state, multipliers)))
@@ -56,6 +54,8 @@ def dual_bound(form: MinMaxForm, convex: ConvexRows, state: FirstOrder, x: Array
 def _globally(form: MinMaxForm, convex: ConvexRows, state: FirstOrder, x: Array, multipliers: Array) -> float:
     """Return by how much the factor may exceed the optimum, from the growth that the rows have everywhere."""
     rows = state.rows
+    if not float(rows.weight @ multipliers) > 0:
+        return np.inf
     r = rows.gradient.T @ multipliers
     values, vectors = np.linalg.eigh(convex.growth(multipliers))
     along = vectors.T @ r
@@ -155,6 +155,8 @@ def _locally(form: MinMaxForm, state: FirstOrder, x: Array) -> float:
         return np.inf
     program = _lagrangian_hessian(objectives.function, constraints.function)
     rows, multipliers, n = state.rows, state.multipliers, len(x)
+    if not float(rows.weight @ multipliers) > 0:
+        return np.inf
     weights = np.zeros(form.objectives.size)
     np.add.at(weights, form.objective, state.dual[: len(form.weight)] * form.sign)
     others = state.dual[len(form.weight) : len(form.weight) + form.constraints.size]

@@ -1,5 +1,7 @@
 """First-order residuals and dual bound: judged on problems whose multipliers are known by hand."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -91,3 +93,13 @@ def test_no_bound_without_growth_or_reach() -> None:
     assert dual_bound(boxed, boxed_convex, first_order(boxed, np.zeros(1), np.zeros(0)), np.zeros(1)) == pytest.approx(
         -2
     )
+
+
+def test_multipliers_that_leave_no_weight_on_the_objectives_prove_nothing() -> None:
+    """Found by the campaign: x <= 1 with multiplier 5 outweighs the objective x with 0.1, and balancing drops it."""
+    form = Minimax(X, [X[0]], A=[[1, 0]], b=[1]).form
+    convex = convex_rows(form)
+    assert convex is not None
+    state = first_order(form, np.array([1.0, 0.0]), np.zeros(0))
+    given = replace(state, multipliers=np.array([0.1, 5.0]), dual=np.array([0.1, 5.0, 0.0, 0.0]))
+    assert dual_bound(form, convex, given, np.array([1.0, 0.0])) == -np.inf

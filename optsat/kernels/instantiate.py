@@ -19,7 +19,7 @@ Leaf: TypeAlias = Program | KernelSource
 _SLOT = re.compile(r"^/\*@(leaf|step) (\w+): ([\w +*]+) -> ([\w +*]+) \*/$", re.MULTILINE)
 _INCLUDE = re.compile(r"^/\*@include (\w+)\*/$", re.MULTILINE)
 _SIZES = "/*@sizes*/"
-_TABLES = "/*@tables*/"
+_TABLES = re.compile(r"^( *)/\*@tables\*/$", re.MULTILINE)
 
 _WRAPPED = """\
 typedef struct {{
@@ -78,7 +78,8 @@ def instantiate(
         raise InputError(f"Template {template} has no size, constant or table {sorted(unknown)}.")
     listed = ", ".join(f"KERNEL_{size} = {value}" for size, value in sizes.items() if size in named)
     text = text.replace(_SIZES, f"enum {{ {listed} }};")
-    text = text.replace(_TABLES, "\n".join(_table(f"KERNEL_{key}", values) for key, values in tables.items()))
+    printed = [_table(f"KERNEL_{key}", values) for key, values in tables.items()]
+    text = _TABLES.sub(lambda found: "\n".join(f"{found[1]}{table}" for table in printed), text)
     for key, value in constants.items():
         text = re.sub(rf"\bKERNEL_{key}\b", c_constant(float(value)), text)
     text = _SLOT.sub(lambda found: _filled(template, found, leaves[found[2]], sizes), text)

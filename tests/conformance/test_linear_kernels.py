@@ -13,7 +13,7 @@ from optsat.kernels.linear import cholesky_solve, gmres, ldl_solve, recursive_le
 from optsat.kernels.source import KernelSource
 from optsat.kernels.status import Status
 
-SIZES = (1, 2, 3, 5, 7, 8, 9, 12)
+SIZES = (1, 2, 5, 8, 12)
 
 
 def positive_definite(rng: np.random.Generator, n: int) -> Array:
@@ -207,14 +207,14 @@ def _samples(rng: np.random.Generator, kernel: str, n: int) -> list[Array]:
     return [np.append(x, 1e-10) for x in samples] if kernel == "gmres" else samples
 
 
-@pytest.mark.parametrize("n", [1, 3, 8, 11])
+@pytest.mark.parametrize("n", [1, 8, 11])
 @pytest.mark.parametrize("make", [cholesky_solve, ldl_solve, recursive_least_squares, gmres])
 def test_every_form_has_the_bits_of_the_twin(make: Callable[[int], KernelSource], n: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(500 + n)
     source = make(n)
     samples = _samples(rng, source.name, n)
     singular = [np.where(np.arange(len(x)) < n, 0.0, x) for x in samples[:3]]
-    hostile = [spoilt(x, rng) for x in samples for _ in range(3)]
+    hostile = [spoilt(x, rng) for x in samples for _ in range(2)]
     assert_twin_agrees(source, np.array([*samples, *singular, *hostile, np.zeros_like(samples[0])]), tmp_path)
 
 

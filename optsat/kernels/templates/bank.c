@@ -2,8 +2,6 @@
 
 /*@sizes*/
 
-/*@tables*/
-
 /*@step filter: ARGUMENTS -> RESULTS */
 
 /*@leaf restore: N -> N */
@@ -23,6 +21,8 @@ typedef struct {
     os_real_t failed[KERNEL_MODES];
     os_real_t mixing[KERNEL_MODES][KERNEL_MODES];
     os_real_t pair[2 * KERNEL_N];
+    os_real_t reference[KERNEL_N];
+    os_real_t merged[KERNEL_N * (KERNEL_N + 1)];
     os_real_t offset[KERNEL_MODES][KERNEL_N];
     os_real_t mean[KERNEL_N][KERNEL_MODES];
     os_real_t deviation[KERNEL_N][KERNEL_MODES];
@@ -144,7 +144,10 @@ static void KERNEL_find_offsets(KERNEL_work_t *work, const os_real_t *reference,
 static void KERNEL_mix(KERNEL_work_t *work, int32_t count)
 {
     for (int32_t e = 0; e < KERNEL_N; ++e) {
-        os_real_t mean[KERNEL_MODES] = { (os_real_t)0 };
+        os_real_t mean[KERNEL_MODES];
+        for (int32_t j = 0; j < KERNEL_MODES; ++j) {
+            mean[j] = (os_real_t)0;
+        }
         for (int32_t i = 0; i < count; ++i) {
             for (int32_t j = 0; j < KERNEL_MODES; ++j) {
                 mean[j] += work->mixing[i][j] * work->offset[i][e];
@@ -191,6 +194,7 @@ static void KERNEL_take(KERNEL_work_t *work, const os_real_t *reference, int32_t
 /* Run the filter of mode j; where it fails, the mixed state stays and the mode becomes as improbable as the floor. */
 static void KERNEL_run(KERNEL_work_t *work, const os_real_t *x, const os_real_t *reference, int32_t j)
 {
+    /*@tables*/
     KERNEL_take(work, reference, j, work->argument, &work->argument[KERNEL_N]);
     for (int32_t k = KERNEL_N * (KERNEL_N + 1); k < KERNEL_ARGUMENTS; ++k) {
         work->argument[k] = x[KERNEL_PLACE[k] + (j * KERNEL_STRIDE[k])];
@@ -233,37 +237,34 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
         work->log_probability[j] = log_probability[j];
         work->failed[j] = (os_real_t)0;
     }
-    os_real_t reference[KERNEL_N] = { (os_real_t)0 };
-    os_real_t mean[KERNEL_N] = { (os_real_t)0 };
-    os_real_t covariance[KERNEL_N * KERNEL_N] = { (os_real_t)0 };
     if (status == OS_OK) {
         (void)KERNEL_normalise(work, count);
         const int32_t before = KERNEL_most_probable(work->log_probability, count);
         for (int32_t e = 0; e < KERNEL_N; ++e) {
-            reference[e] = work->state[before][e];
+            work->reference[e] = work->state[before][e];
         }
         KERNEL_find_mixing(work, transition, count);
-        KERNEL_find_offsets(work, reference, count);
+        KERNEL_find_offsets(work, work->reference, count);
         KERNEL_mix(work, count);
         for (int32_t j = 0; j < count; ++j) {
-            KERNEL_run(work, x, reference, j);
+            KERNEL_run(work, x, work->reference, j);
             all_failed *= work->failed[j];
         }
         evidence = KERNEL_normalise(work, count);
         const int32_t after = KERNEL_most_probable(work->log_probability, count);
         for (int32_t e = 0; e < KERNEL_N; ++e) {
-            reference[e] = work->state[after][e];
+            work->reference[e] = work->state[after][e];
         }
         for (int32_t i = 0; i < count; ++i) {
             for (int32_t j = 0; j < KERNEL_MODES; ++j) {
                 work->mixing[i][j] = (j == 0) ? KERNEL_exp(work->log_probability[i]) : (os_real_t)0;
             }
         }
-        KERNEL_find_offsets(work, reference, count);
+        KERNEL_find_offsets(work, work->reference, count);
         KERNEL_mix(work, count);
-        KERNEL_take(work, reference, 0, mean, covariance);
-        const bool finite = os_all_finite(mean, KERNEL_N) && os_all_finite(covariance, KERNEL_N * KERNEL_N);
-        status = (all_failed > (os_real_t)0) ? OS_E_STATE : (finite ? OS_OK : OS_E_OUTPUT);
+        KERNEL_take(work, work->reference, 0, work->merged, &work->merged[KERNEL_N]);
+        status = os_all_finite(work->merged, KERNEL_N * (KERNEL_N + 1)) ? OS_OK : OS_E_OUTPUT;
+        status = (all_failed > (os_real_t)0) ? OS_E_STATE : status;
     }
     const bool good = status == OS_OK;
     os_real_t *out = y;
@@ -280,11 +281,8 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
         out[KERNEL_MODES + j] = work->failed[j];
     }
     out = &out[2 * KERNEL_MODES];
-    for (int32_t e = 0; e < KERNEL_N; ++e) {
-        out[e] = good ? mean[e] : (os_real_t)NAN;
-    }
-    for (int32_t e = 0; e < (KERNEL_N * KERNEL_N); ++e) {
-        out[KERNEL_N + e] = good ? covariance[e] : (os_real_t)NAN;
+    for (int32_t e = 0; e < (KERNEL_N * (KERNEL_N + 1)); ++e) {
+        out[e] = good ? work->merged[e] : (os_real_t)NAN;
     }
     out[KERNEL_N * (KERNEL_N + 1)] = good ? evidence : (os_real_t)NAN;
     return status;

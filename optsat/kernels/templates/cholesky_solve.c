@@ -14,7 +14,8 @@ typedef struct {
 static os_real_t KERNEL_factorise(KERNEL_work_t *work)
 {
     os_real_t least = (os_real_t)1;
-    for (int32_t j = 0; (j < KERNEL_N) && (least > (os_real_t)0); ++j) {
+    bool usable = true;
+    for (int32_t j = 0; (j < KERNEL_N) && usable; ++j) {
         os_real_t rest[KERNEL_PADDED];
         for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
             rest[i] = work->factor[j][i];
@@ -32,7 +33,7 @@ static os_real_t KERNEL_factorise(KERNEL_work_t *work)
             }
         }
         const os_real_t pivot = rest[j];
-        const bool usable = (pivot > (((os_real_t)KERNEL_N * OS_EPSILON) * diagonal)) && (pivot <= OS_REAL_MAX);
+        usable = (pivot > (((os_real_t)KERNEL_N * OS_EPSILON) * diagonal)) && (pivot <= OS_REAL_MAX);
         least = usable ? os_fmin(least, pivot / diagonal) : (os_real_t)0;
         work->reciprocal[j] = (os_real_t)1 / os_sqrt(usable ? pivot : (os_real_t)1);
         for (int32_t i = 0; i < KERNEL_PADDED; ++i) {

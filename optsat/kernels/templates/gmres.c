@@ -32,7 +32,10 @@ static os_real_t KERNEL_length(const os_real_t *a, os_real_t *scaled)
 
 static void KERNEL_multiply(const KERNEL_work_t *work, const os_real_t *factor, os_real_t *product)
 {
-    os_real_t sum[KERNEL_PADDED] = { (os_real_t)0 };
+    os_real_t sum[KERNEL_PADDED];
+    for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
+        sum[i] = (os_real_t)0;
+    }
     for (int32_t first = 0; first < KERNEL_PADDED; first += KERNEL_GROUP) {
         for (int32_t i = 0; i < KERNEL_PADDED; ++i) {
             sum[i] = (((sum[i] + (work->columns[first][i] * factor[first]))

@@ -2,8 +2,6 @@
 
 /*@sizes*/
 
-/*@tables*/
-
 /*@leaf send: K -> G */
 
 /*@leaf node: K + G + DEGREES + A + C -> K */
@@ -18,6 +16,7 @@ typedef struct {
 /* x: states (NODES, K), what nodes have of their own (NODES, A), what they share (C); y: states (NODES, K) */
 static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *work)
 {
+    /*@tables*/
     const os_real_t *own = &x[KERNEL_NODES * KERNEL_K];
     const os_real_t *shared = &own[KERNEL_NODES * KERNEL_A];
     for (int32_t i = 0; i < KERNEL_NODES; ++i) {
@@ -30,8 +29,11 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
         work->argument[KERNEL_K + KERNEL_G + KERNEL_DEGREES + KERNEL_A + k] = shared[k];
     }
     for (int32_t i = 0; i < KERNEL_NODES; ++i) {
-        os_real_t sum[KERNEL_G] = { (os_real_t)0 };
+        os_real_t sum[KERNEL_G];
         os_real_t degree = (os_real_t)0;
+        for (int32_t k = 0; k < KERNEL_G; ++k) {
+            sum[k] = (os_real_t)0;
+        }
         for (int32_t edge = KERNEL_ROWS[i]; edge < KERNEL_ROWS[i + 1]; ++edge) {
             const os_real_t weight = KERNEL_WEIGHT[edge];
             degree += weight;

@@ -108,7 +108,7 @@ static os_real_t KERNEL_relative_rest(const KERNEL_work_t *work)
     }
     const os_real_t rest = KERNEL_largest(work->rest, 0);
     const os_real_t scale = (widest * KERNEL_largest(work->solution, 0)) + KERNEL_largest(work->given, 0);
-    return (scale > (os_real_t)0) ? (rest / scale) : rest;
+    return rest / ((scale > (os_real_t)0) ? scale : (os_real_t)1);
 }
 
 /* x: A (N, N), b (N); y: x (N), relative residual, number of negative pivots */

@@ -23,7 +23,10 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
         work->row[i] = (i < KERNEL_N) ? h[i] : (os_real_t)0;
         work->gain[i] = (os_real_t)0;
     }
-    os_real_t sum[KERNEL_N] = { (os_real_t)0 };
+    os_real_t sum[KERNEL_N];
+    for (int32_t i = 0; i < KERNEL_N; ++i) {
+        sum[i] = (os_real_t)0;
+    }
     for (int32_t k = 0; k < KERNEL_N; ++k) {
         for (int32_t i = 0; i < KERNEL_N; ++i) {
             sum[i] += P[(k * KERNEL_N) + i] * work->row[k];
@@ -67,13 +70,14 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
         }
     }
     const bool good = status == OS_OK;
+    const int32_t covered = KERNEL_N * (KERNEL_N + 1);
     for (int32_t i = 0; i < KERNEL_N; ++i) {
         y[i] = good ? work->theta[i] : (os_real_t)NAN;
     }
     for (int32_t i = 0; i < (KERNEL_N * KERNEL_N); ++i) {
         y[KERNEL_N + i] = good ? work->covariance[i] : (os_real_t)NAN;
     }
-    y[KERNEL_N * (KERNEL_N + 1)] = good ? innovation : (os_real_t)NAN;
-    y[(KERNEL_N * (KERNEL_N + 1)) + 1] = good ? (spread * inflation) : (os_real_t)NAN;
+    y[covered] = good ? innovation : (os_real_t)NAN;
+    y[covered + 1] = (good ? (spread * inflation) : (os_real_t)NAN);
     return status;
 }

@@ -84,4 +84,4 @@ def _relative_rest(matrix: Array, given: Array, solution: Array) -> float:
         widest = widest if np.isnan(total) or widest >= total else total
     rest = largest(_rest(matrix, given, solution))
     scale = widest * largest(solution) + largest(given)
-    return float(rest / scale) if scale > 0.0 else rest
+    return float(rest / (scale if scale > 0.0 else 1.0))

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from optsat.arrays import Array
 from optsat.attain import goal_attain, minimax
 from optsat.solution import Proof
 
@@ -55,3 +56,22 @@ def test_a_weight_of_zero_is_a_constraint() -> None:
     assert solution.residuals["hard_goal_violation"] <= 1e-8
     assert solution.answer.factor == pytest.approx(4, rel=1e-7)
     assert solution.answer.active_constraints == ("hard goal 1 (at most)",)
+
+
+def closed_loop(K: Array) -> Array:
+    """Return the real parts, ascending, of the eigenvalues of A + B K C of the classical pole placement."""
+    A = np.array([[-0.5, 0, 0], [0, -2, 10], [0, 1, -2]])
+    B, C = np.array([[1.0, 0], [-2, 2], [0, 1]]), np.array([[1.0, 0, 0], [0, 0, 1]])
+    return np.sort(np.linalg.eigvals(A + B @ K.reshape(2, 2) @ C).real)
+
+
+def test_pole_placement_of_the_classical_solver() -> None:
+    """A black box; with weights |goal| the factor is the over-achievement as a fraction of the goals."""
+    goals = np.array([-5.0, -3.0, -1.0])
+    solution = goal_attain(-np.ones(4), closed_loop, goals, np.abs(goals), lb=-4, ub=4)
+    assert solution.proof is Proof.STATIONARY
+    assert solution.answer.factor == pytest.approx(-0.3862602550, abs=1e-7)
+    np.testing.assert_allclose(solution.answer.objectives, (-6.93130127, -4.15878077, -1.40991795), atol=1e-6)
+    np.testing.assert_allclose(solution.answer.x, (-4, -0.2563553, -4, -4), atol=1e-5)
+    assert solution.answer.active_constraints == ("bound of x[0]", "bound of x[2]", "bound of x[3]")
+    assert float(np.abs(goals) @ solution.answer.multipliers) == pytest.approx(1, abs=1e-6)

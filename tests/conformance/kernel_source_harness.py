@@ -63,9 +63,7 @@ def sizes(source: KernelSource) -> tuple[int, int]:
 
 
 def unit_text(source: KernelSource) -> str:
-    headers = sorted(each.name for each in resources.files("optsat.kernels.c").iterdir() if each.name.endswith(".h"))
-    included = [f'#include "{header}"' for header in headers if "lanes" not in header]
-    return "\n".join([*included, source.body, _CALL.format(name=source.name)])
+    return "\n".join(['#include "os_rt.h"', source.body, _CALL.format(name=source.name)])
 
 
 def compile_text(text: str, path: Path, compiler: str, flags: Sequence[str]) -> None:

@@ -17,7 +17,8 @@ UNBOUNDED = 1e20
 """Bounds from this size on stand for none."""
 
 LARGEST = 24
-"""Unknowns above which the work memory no longer belongs on a stack."""
+MOST_ROWS = 160
+"""Unknowns and rows above which the work memory no longer belongs on a stack."""
 
 
 def minmax(
@@ -66,7 +67,8 @@ def minmax(
 
     F, g = ca.vec(ca.SX(objectives)), ca.SX(0, 1) if constraints is None else ca.vec(ca.SX(constraints))
     n = check_size(name, "number of unknowns", x.numel(), 1, LARGEST)
-    m = check_size(name, "number of objectives", F.numel(), 1, LARGEST)
+    m = check_size(name, "number of objectives", F.numel(), 1, MOST_ROWS)
+    check_size(name, "number of rows", m + len(absolute) + g.numel(), 1, MOST_ROWS)
     for i in absolute:
         check_size(name, "absolute index", i, 0, m - 1)
     if residuals and len(residuals) != m:

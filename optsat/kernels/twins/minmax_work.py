@@ -134,10 +134,11 @@ def fmin(a: Array | float, b: Array | float) -> Array:
 def largest_of(values: Array, least: float) -> float:
     """Return the last of the largest, `least` and NaN aside."""
     for value in values:
-        least = float(fmax(value, least))
+        least = np.float64(fmax(value, least))
     return least
 
 
 def ordered_sum(values: Array, start: float = 0.0) -> float:
     """Return the sum in the order of the entries."""
-    return float(np.add.accumulate(np.concatenate([[start], values]))[-1])
+    # no Python float: the C form divides by zero without a word
+    return np.float64(np.add.accumulate(np.concatenate([[start], values]))[-1])

@@ -5,7 +5,7 @@ all later processes too, and then a tenth of the time or less. Both give the sam
 library functions. So a function starts interpreted and is compiled when it has computed `COMPILE_AFTER` samples.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,11 @@ from optsat.kernels.casadi_form import CasadiForm
 from optsat.kernels.lowering import LARGE
 from optsat.kernels.record import KernelRecord
 from optsat.port import Port
+
+if TYPE_CHECKING:
+    from optsat.kernels.elementary import Math
+    from optsat.kernels.kernel import Kernel
+    from optsat.kernels.unit import Real
 
 COMPILE_AFTER = 10_000
 """Samples that take about as long interpreted as a kernel takes to compile."""
@@ -29,6 +34,7 @@ class Evaluation:
         self._form = CasadiForm(function, KernelRecord(name, "double", inputs, outputs))
         self._samples = 0
         self._compiled: Any = None
+        self._kernels: dict[tuple[Real, Math], Kernel] = {}
 
     def call(self, *args: Any, **kwargs: Any) -> Any:
         """Return the results of one sample, checked as `Kernel` does."""
@@ -50,6 +56,14 @@ class Evaluation:
             self._arguments.refuse_not_finite(arrays)
         return results[0] if len(results) == 1 else results
 
+    def kernel(self, real: "Real", math: "Math") -> "Kernel":
+        """Return the kernel, made once of each kind."""
+        from optsat.kernels.open_kernel import make_kernel
+
+        if (real, math) not in self._kernels:
+            self._kernels[real, math] = make_kernel(self, real, math)
+        return self._kernels[real, math]
+
     def _count(self, samples: int) -> None:
         if self._compiled is not None or self._samples >= COMPILE_AFTER:
             return
@@ -57,10 +71,8 @@ class Evaluation:
         # above that size compilation takes long enough that somebody must ask for it
         if self._samples < COMPILE_AFTER or self._function.n_instructions() > LARGE:
             return
-        from optsat.kernels.open_kernel import make_kernel
-
         try:
-            kernel = make_kernel(self, math="libm")
+            kernel = self.kernel("double", "libm")
         except OptsatError:
             # an operation that no kernel knows: CasADi goes on with it
             return

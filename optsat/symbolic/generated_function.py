@@ -74,9 +74,7 @@ class GeneratedFunction:
         ------
         InputError : an operation or constant that no kernel can have, or too many operations.
         """
-        from optsat.kernels.open_kernel import make_kernel
-
-        return make_kernel(self, real, math)
+        return self._evaluation.kernel(real, math)
 
     def c_source(self, target: str = "host", real: "Real" = "double", math: "Math" = "own") -> str:
         """Return it as C99 that needs no other file: `NAME_call` of one sample, `NAME_batch` of many.

@@ -239,6 +239,28 @@ def test_an_interpreted_kernel_travels(monkeypatch: pytest.MonkeyPatch) -> None:
         make_kernel(turning(), real="float")
 
 
+def test_no_compiler_in_earnest(root: Path, tmp_path: Path) -> None:
+    program = f"""
+import sys, warnings
+sys.path[:0] = [{HERE!r}]
+warnings.simplefilter("error")
+from kernel_examples import equations, samples, solving, turning
+from optsat.kernels.interpreted import CompilerMissing
+from optsat.kernels.open_kernel import make_kernel
+warnings.simplefilter("always", CompilerMissing)
+with warnings.catch_warnings(record=True) as caught:
+    kernels = make_kernel(turning()), make_kernel(solving())
+assert [kernel.form for kernel in kernels] == ["casadi", "python"]
+assert len(caught) == 1 and "CC names /nonexistent" in str(caught[0].message), caught
+print(kernels[0].batch(*samples(5))[0].tobytes().hex(), kernels[1].batch(*equations(5))[2].tolist())
+"""
+    environment = {**os.environ, "PYTHONPATH": str(root), "CC": "/nonexistent"}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    expected = make_kernel(turning()).batch(*samples(5))[0].tobytes().hex()
+    assert done.stdout.strip() == f"{expected} [4, 0, 0, 4, 0]"
+
+
 def _in_a_child(kernel: Kernel, write: int) -> None:
     os.write(write, b"".join(answer_of(kernel)))
     os._exit(0)

@@ -146,6 +146,7 @@ def test_without_a_compiler_nothing_changes_and_it_is_said(monkeypatch: pytest.M
 def test_a_kernel_of_one() -> None:
     f, (x, t) = swinging(), numbers(20)
     exact = f.kernel(math="libm")
+    assert f.kernel(math="libm") is exact
     assert exact.record.libm == ("cos", "exp", "sin")
     np.testing.assert_array_equal(exact.batch(x, t)[0], f.batch(x, t)[0])
     own = f.kernel()

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from optsat.commands import attitude, bench, cache, demo, doctor, export, simulate, study, study_report, verify
+from optsat.commands import attitude, bench, cache, demo, doctor, export, simulate, study, study_report, verify, view
 from optsat.commands.output import note
 from optsat.errors import OptsatError
 
@@ -53,6 +53,7 @@ app.command("demo", epilog="Example: optsat demo --out my-demo")(demo.demo_comma
 app.command("attitude", epilog="Example: optsat attitude log.csv --window 60 --plot attitude.svg")(
     attitude.attitude_command
 )
+app.command("view", epilog="Example: optsat view log.csv --window 60 --out page.html")(view.view_command)
 app.command("verify", epilog="Example: optsat verify certificate.json")(verify.verify_command)
 app.command("simulate", epilog="Example: optsat simulate scenario.toml --out log.csv --seed 1")(
     simulate.simulate_command

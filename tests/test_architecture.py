@@ -208,6 +208,10 @@ RULES: dict[str, tuple[Rule, Tree]] = {
         only("report", {"campaign", "plots", "arrays", "errors"}),
         {"optsat.report.html_report": "from optsat.records.record import Record"},
     ),
+    "view imports only report, estimators, records, attitude, arrays and errors": (
+        only("view", {"report", "estimators", "records", "attitude", "arrays", "errors"}),
+        {"optsat.view.scene": "from optsat.determine import certify_attitude"},
+    ),
     "attitude imports only arrays and errors": (
         only("attitude", {"arrays", "errors"}),
         {"optsat.attitude.dcm": "from optsat.port import Port"},

@@ -1,46 +1,41 @@
 """`optsat attitude`: attitudes of a measurement log, each with a guaranteed bound."""
 
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from optsat.commands.log_options import (
+    AnyLogFormat,
+    LogFormat,
+    LogPath,
+    Strict,
+    Stride,
+    WindowLength,
+    WindowSpacing,
+    read_log,
+    window_of,
+    window_words,
+)
 from optsat.commands.output import AsJson, aligned, note, print_json, progress_bar
 from optsat.commands.series_output import finding, report_document, report_rows, require_folders
 from optsat.errors import InputError
 
 if TYPE_CHECKING:
     from optsat.arrays import Array
-    from optsat.estimators.attitude_series import AttitudeSeries, Window
+    from optsat.estimators.attitude_series import AttitudeSeries
     from optsat.records.record import BadRow, Record
 
-_SPACINGS_IN_A_WINDOW = 15
 _MOST_BAD_ROWS = 10
 
 
-class LogFormat(Enum):
-    """What a log may be."""
-
-    CSV = "csv"
-    BROAD = "broad"
-
-
 def attitude_command(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="The measurement log.", show_default=False)],
-    log_format: Annotated[LogFormat, typer.Option("--format", help="Format of the log.")] = LogFormat.CSV,
-    window: Annotated[
-        float | None,
-        typer.Option(metavar="SECONDS", help="Use the past this long, carried by the gyro.", show_default=False),
-    ] = None,
-    spacing: Annotated[
-        float | None,
-        typer.Option(metavar="SECONDS", help="One past epoch every so often; window / 15.", show_default=False),
-    ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Stop at the first bad row of the log.")] = False,
-    stride: Annotated[
-        int, typer.Option(min=1, help="Determine every N-th epoch only; the gyro is used throughout.")
-    ] = 1,
+    log: LogPath,
+    log_format: AnyLogFormat = LogFormat.CSV,
+    window: WindowLength = None,
+    spacing: WindowSpacing = None,
+    strict: Strict = False,
+    stride: Stride = 1,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.csv", help="Write one row per epoch.", show_default=False)
     ] = None,
@@ -59,12 +54,12 @@ def attitude_command(
     from optsat.estimators.series_report import report_series
     from optsat.files import write_atomically
 
-    memory = _window(window, spacing)
+    memory = window_of(window, spacing)
     if certificates is not None and memory is not None:
         raise InputError("--certificates holds single frames; leave out --window.")
     require_folders(out, plot, certificates)
     figure_kind = _figure_format(plot)
-    record = _read(log, log_format, strict)
+    record = read_log(log, log_format, strict)
     with progress_bar(f"attitudes of {log.name}") as progress:
         series = certify_record(record, memory, progress, every=stride)
     truth = None if record.q_BN_true is None else record.q_BN_true[::stride]
@@ -86,39 +81,13 @@ def attitude_command(
             }
         )
     else:
-        typer.echo(f"{log}: {_how(memory)}")
+        typer.echo(f"{log}: {window_words(memory)}")
         typer.echo(aligned([*report_rows(report), *_bad_rows_in_words(record.bad_rows)]))
     for file in (out, plot, certificates):
         if file is not None:
             note(f"Written to {file}.")
     if record.bad_rows or report.contradiction:
         raise typer.Exit(1)
-
-
-def _window(length_s: float | None, spacing_s: float | None) -> "Window | None":
-    from optsat.estimators.attitude_series import Window
-
-    if length_s is None:
-        if spacing_s is not None:
-            raise InputError("--spacing needs --window: it is the step in which the past is used.")
-        return None
-    return Window(length_s, length_s / _SPACINGS_IN_A_WINDOW if spacing_s is None else spacing_s)
-
-
-def _how(window: "Window | None") -> str:
-    if window is None:
-        return "single frames"
-    return f"window of {window.length_s:g} s, one epoch every {window.spacing_s:g} s"
-
-
-def _read(log: Path, log_format: LogFormat, strict: bool) -> "Record":
-    if log_format is LogFormat.BROAD:
-        from optsat.records.broad import load_broad
-
-        return load_broad(log)
-    from optsat.records.csv_log import read_csv_log
-
-    return read_csv_log(log, strict)
 
 
 def _figure_format(plot: Path | None) -> str:

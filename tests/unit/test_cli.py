@@ -17,7 +17,7 @@ from optsat.cli import app
 TOY = Path(__file__).parent / "campaign" / "toy_study.py"
 COMMANDS: tuple[list[str], ...] = (
     [],
-    *(["demo"], ["attitude"], ["verify"], ["simulate"]),
+    *(["demo"], ["attitude"], ["view"], ["verify"], ["simulate"]),
     *(["study"], ["study", "list"], ["study", "run"], ["study", "report"]),
     *(["export"], ["bench"], ["cache"], ["cache", "show"], ["cache", "clean"], ["doctor"]),
 )

@@ -1,0 +1,1 @@
+"""View: an attitude series as an interactive page."""

@@ -10,6 +10,9 @@ from optsat.kernels.form import STATUSES, Kind
 from optsat.kernels.record import KernelRecord
 from optsat.kernels.unit import ABI
 
+MAX_PORTS = 64
+"""Arguments and results together that the binding has room for."""
+
 
 class BoundForm:
     """See `Form`."""

@@ -2,7 +2,7 @@
 
 from optsat.kernels import cache
 from optsat.kernels.binding import find_binding
-from optsat.kernels.bound_form import BoundForm
+from optsat.kernels.bound_form import MAX_PORTS, BoundForm
 from optsat.kernels.compilation import compiled
 from optsat.kernels.ctypes_form import CtypesForm
 from optsat.kernels.entry import Entry
@@ -42,6 +42,7 @@ def bound(library: str, record: KernelRecord) -> Form:
     OSError : the system does not load it. DenormalsFlushedError : this thread computes without denormal numbers.
     """
     check_denormals()
-    if found := find_binding():
+    found = find_binding()
+    if found and len(record.inputs) + len(record.outputs) <= MAX_PORTS:
         return BoundForm(*found, library, record)
     return CtypesForm(library, record)

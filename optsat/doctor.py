@@ -23,7 +23,7 @@ REQUIRED = (
     "threadpoolctl",
     "typer",
 )
-EXTRAS = {"results": ("h5netcdf", "h5py", "xarray"), "cluster": ("distributed",), "peers": ("ahrs",)}
+EXTRAS = {"results": ("h5netcdf", "h5py", "xarray"), "cluster": ("distributed",), "peers": ("ahrs", "bsk", "filterpy", "stonesoup")}
 
 
 class Health(enum.Enum):

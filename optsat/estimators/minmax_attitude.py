@@ -11,12 +11,16 @@ from optsat.kernels.minmax import minmax
 from optsat.kernels.source import KernelSource
 from optsat.port import Port
 
+_RANGES = {"x0": (-1.0, 1.0), "goals": (-1.0, 1.0), "weights": (1e-6, 1e3), "lower": (-1.0, 0.0), "upper": (0.0, 1.0)}
+
 
 def minmax_attitude(vectors: int = 7, gauss_newton: bool = False) -> KernelSource:
     """Return the kernel `minmax_attitude`, as `optsat.kernels.minmax.minmax` describes it, of `interval_losses`.
 
     x : Gibbs vector g in B, then the position of each pair in its box; q_BN = [g; 1] (x) q0 normalised
     b_B, radius_B : middle of each measured direction and how far it may be off, in B; y_B : A(q0) r_N
+
+    Flight code takes bounds on either side of zero, and weights above it.
 
     vectors : number of pairs
     gauss_newton : leave out the curvature of the errors themselves
@@ -26,8 +30,7 @@ def minmax_attitude(vectors: int = 7, gauss_newton: bool = False) -> KernelSourc
     import casadi as ca
 
     x = ca.SX.sym("x", 3 + vectors)
-    names = ("b_B", "radius_B", "y_B")
-    b_B, radius_B, y_B = symbols = [ca.SX.sym(name, vectors, 3) for name in names]
+    b_B, radius_B, y_B = (ca.SX.sym(name, vectors, 3) for name in ("b_B", "radius_B", "y_B"))
     errors = [
         (b_B[i, :] + x[3 + i] * radius_B[i, :]).T - _turned(x[:3], y_B[i, :].T)
         for i in range(vectors if gauss_newton else 0)
@@ -36,8 +39,13 @@ def minmax_attitude(vectors: int = 7, gauss_newton: bool = False) -> KernelSourc
         "minmax_attitude",
         x,
         interval_losses(x, b_B, radius_B, y_B),
-        parameters=[(Port(name, (vectors, 3), "-"), each) for name, each in zip(names, symbols, strict=True)],
+        parameters=[
+            (Port("b_B", (vectors, 3), "-", lower=-2.0, upper=2.0), b_B),
+            (Port("radius_B", (vectors, 3), "-", lower=0.0, upper=2.0), radius_B),
+            (Port("y_B", (vectors, 3), "-", unit_norm=1e-3), y_B),
+        ],
         residuals=errors,
+        ranges=_RANGES,
     )
 
 

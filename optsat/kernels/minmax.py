@@ -1,6 +1,6 @@
 """Min-max: the least attainment factor of objectives against their goals, under constraints and bounds."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from optsat.errors import InputError
@@ -29,6 +29,7 @@ def minmax(
     parameters: Sequence[tuple[Port, Any]] = (),
     absolute: Sequence[int] = (),
     residuals: Sequence[Any] = (),
+    ranges: Mapping[str, tuple[float, float]] | None = None,
 ) -> KernelSource:
     """Return the kernel (x0, parameters, goals, weights, lower, upper) -> (x, gamma, multipliers, bound_multipliers,
     residual, iterations) of
@@ -41,6 +42,7 @@ def minmax(
     absolute : indices of objectives that must also satisfy -(F_i - goal_i) <= |weight_i| gamma
     residuals : unless empty, one vector for each objective, F_i = |residual_i|^2 / 2 + linear: the curvature of F is
         then that of Gauss and Newton, of g none; exact otherwise
+    ranges : least and largest entry that flight code accepts of x0, goals, weights, lower and upper, by name
 
     At run time a weight of 0 makes an objective a hard constraint, a negative one asks for F_i >= goal_i; minimax is
     goals 0 and weights 1. Bounds of 1e20 or more stand for none, equal ones fix a variable.
@@ -101,10 +103,10 @@ def minmax(
         sizes=sizes.of_template(),
         constants={"UNBOUNDED": UNBOUNDED},
         inputs=(
-            Port("x0", (n,), "-"),
+            _port("x0", n, ranges),
             *(port for port, _ in parameters),
-            *(Port(each, (m,), "-") for each in ("goals", "weights")),
-            *(Port(each, (n,), "-") for each in ("lower", "upper")),
+            *(_port(each, m, ranges) for each in ("goals", "weights")),
+            *(_port(each, n, ranges) for each in ("lower", "upper")),
         ),
         outputs=(
             Port("x", (n,), "-"),
@@ -116,6 +118,11 @@ def minmax(
         ),
         twin=twin(sizes, leaves, UNBOUNDED),
     )
+
+
+def _port(name: str, size: int, ranges: Mapping[str, tuple[float, float]] | None) -> Port:
+    least, most = (ranges or {}).get(name, (None, None))
+    return Port(name, (size,), "-", lower=least, upper=most)
 
 
 def _curvatures(functions: Any, x: Any, weights: Any, residuals: Sequence[Any], name: str) -> list[Any]:

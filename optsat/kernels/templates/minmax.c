@@ -20,7 +20,7 @@ typedef struct {
 
 /* Pairs: the rows, the lower bounds, the upper bounds. Of x and gamma together there are V, in rows of length PADDED.
    derivative: values of the rows, their gradients (each followed by -width and padding), Hessian of their sum weighted
-   by the multipliers. */
+   by the multipliers, which becomes the matrix of the step. */
 typedef struct {
     os_real_t argument[KERNEL_N + KERNEL_PARAMETERS + KERNEL_ROWS];
     os_real_t derivative[KERNEL_ROWS + ((KERNEL_ROWS + KERNEL_V) * KERNEL_PADDED)];
@@ -34,7 +34,6 @@ typedef struct {
     os_real_t dual_residual[KERNEL_PADDED];
     os_real_t row_residual[KERNEL_ROWS];
     os_real_t inverse[KERNEL_PAIRS];
-    os_real_t matrix[KERNEL_V][KERNEL_PADDED];
     os_real_t rest[KERNEL_V][KERNEL_PADDED];
     os_real_t by_rows[KERNEL_V][KERNEL_PADDED];
     os_real_t by_columns[KERNEL_V][KERNEL_PADDED];

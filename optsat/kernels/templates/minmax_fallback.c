@@ -14,10 +14,11 @@ static os_real_t KERNEL_smoothed(const KERNEL_work_t *work, const KERNEL_point_t
 static void KERNEL_linearise(KERNEL_work_t *work, os_real_t smoothing)
 {
     KERNEL_residuals(work);
+    os_real_t *matrix = KERNEL_matrix(work);
     os_real_t *gradient = work->second.v;
     for (int32_t j = 0; j < KERNEL_PADDED; ++j) {
         for (int32_t k = 0; k < KERNEL_V; ++k) {
-            work->matrix[k][j] = (os_real_t)0;
+            matrix[(k * KERNEL_PADDED) + j] = (os_real_t)0;
         }
         gradient[j] = (j == KERNEL_N) ? (os_real_t)1 : (os_real_t)0;
     }

@@ -59,12 +59,7 @@ static void KERNEL_residuals(KERNEL_work_t *work)
 /* The matrix of the step in x and gamma, slacks and multipliers eliminated, damped until its inertia is right. */
 static bool KERNEL_prepare(KERNEL_work_t *work)
 {
-    const os_real_t *hessian = &work->derivative[KERNEL_ROWS + (KERNEL_ROWS * KERNEL_PADDED)];
-    for (int32_t j = 0; j < KERNEL_V; ++j) {
-        for (int32_t k = 0; k < KERNEL_PADDED; ++k) {
-            work->matrix[j][k] = hessian[(j * KERNEL_PADDED) + k];
-        }
-    }
+    os_real_t *matrix = KERNEL_matrix(work);
     for (int32_t p = 0; p < KERNEL_PAIRS; ++p) {
         work->inverse[p] = (os_real_t)1 / work->now.slack[p];
     }
@@ -74,8 +69,8 @@ static bool KERNEL_prepare(KERNEL_work_t *work)
     for (int32_t j = 0; j < KERNEL_N; ++j) {
         const int32_t lower = KERNEL_ROWS + j;
         const int32_t upper = lower + KERNEL_N;
-        work->matrix[j][j] += work->multiplier[lower] * work->inverse[lower];
-        work->matrix[j][j] += work->multiplier[upper] * work->inverse[upper];
+        matrix[(j * KERNEL_PADDED) + j] += work->multiplier[lower] * work->inverse[lower];
+        matrix[(j * KERNEL_PADDED) + j] += work->multiplier[upper] * work->inverse[upper];
         if (work->fixed[j]) {
             KERNEL_freeze(work, j);
         }

@@ -73,8 +73,7 @@ def freeze(work: MinmaxWork, j: int) -> None:
 def factorise(work: MinmaxWork, damping: float) -> bool:
     """Factor matrix + damping I; False where a pivot is not safely positive."""
     size = len(work.matrix)
-    factor, reciprocal = work.matrix.copy(), np.zeros(size)
-    factor[np.diag_indices(size)] += damping
+    factor, reciprocal = work.matrix + damping * np.eye(size), np.zeros(size)
     diagonal = np.diag(factor).copy()
     for k in range(size):
         pivot = factor[k, k]

@@ -143,7 +143,8 @@ class GoalAttainment:
             raise InputError("`parameters` are symbols of expressions; with functions give `parameter_values` alone.")
         lower, upper = bounds(("lb", "ub"), self.lb, self.ub, n)
         if self.start is not None:
-            start = finite_array("start", self.start, (n,))
+            # one unknown may start from a plain number
+            start = finite_array("start", np.reshape(self.start, -1) if np.ndim(self.start) == 0 else self.start, (n,))
         elif symbolic:
             between = np.isfinite(lower) & np.isfinite(upper)
             start = np.where(between, np.where(between, lower, 0.0) / 2 + np.where(between, upper, 0.0) / 2, 0.0)

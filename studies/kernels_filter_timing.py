@@ -8,6 +8,7 @@ model over all sigma points at once. A peer that is absent is left out, and its 
 import importlib
 import importlib.util
 import math
+import types
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -103,15 +104,12 @@ def _stone_soup(x: Array, P: Array, z: Array) -> Callable[[], Array]:
     transition_base = part("models.transition.base", "TransitionModel")
     gaussian = part("models.base", "GaussianModel")
 
-    class Motion(transition_base, gaussian):  # type: ignore[misc]
-        ndim_state = 7
+    def function(_self: Any, state: Any, noise: Any = False, **_options: Any) -> Any:
+        moved = _batched_step(np.asarray(state.state_vector, dtype=float))
+        return vectors(moved) if moved.shape[1] > 1 else state_vector(moved)
 
-        def function(self, state: Any, noise: Any = False, **_options: Any) -> Any:
-            moved = _batched_step(np.asarray(state.state_vector, dtype=float))
-            return vectors(moved) if moved.shape[1] > 1 else state_vector(moved)
-
-        def covar(self, **_options: Any) -> Any:
-            return np.diag(PROCESS)
+    body = {"ndim_state": 7, "function": function, "covar": lambda _self, **_options: np.diag(PROCESS)}
+    motion = types.new_class("Motion", (transition_base, gaussian), exec_body=lambda space: space.update(body))
 
     from datetime import UTC, datetime, timedelta
 
@@ -119,7 +117,7 @@ def _stone_soup(x: Array, P: Array, z: Array) -> Callable[[], Array]:
     measurement_model = part("models.measurement.linear", "LinearGaussian")(
         ndim_state=7, mapping=tuple(range(7)), noise_covar=np.diag(MEASUREMENT)
     )
-    predictor = part("predictor.kalman", "UnscentedKalmanPredictor")(Motion(), alpha=1.0, beta=2.0, kappa=0.0)
+    predictor = part("predictor.kalman", "UnscentedKalmanPredictor")(motion(), alpha=1.0, beta=2.0, kappa=0.0)
     updater = part("updater.kalman", "UnscentedKalmanUpdater")(measurement_model, alpha=1.0, beta=2.0, kappa=0.0)
     prior = part("types.state", "GaussianState")(x[:, None], P, timestamp=start)
     detection = part("types.detection", "Detection")(z[:, None], timestamp=start + timedelta(seconds=DT))
@@ -163,7 +161,7 @@ def _batched_step(x: Array) -> Array:
     """The same over columns (7, n)."""
 
     def rates(state: Array) -> Array:
-        return np.stack(_rates(list(state)))  # type: ignore[arg-type]
+        return np.stack(_rates(list(state)))
 
     k1 = rates(x)
     k2 = rates(x + 0.5 * DT * k1)

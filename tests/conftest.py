@@ -3,9 +3,13 @@
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from chromium import Chromium
 
 settings.register_profile("optsat", deadline=None, print_blob=True)
 settings.load_profile("optsat")
@@ -68,3 +72,13 @@ def _kernels_of_the_tests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     os.environ["OPTSAT_CACHE"] = str(tmp_path_factory.mktemp("kernels"))
     yield
     del os.environ["OPTSAT_CACHE"]
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Chromium]":
+    """A Chromium that has never been used."""
+    # beside the tests of the report, whose folder is on the path once they are collected
+    from chromium import started
+
+    with started(tmp_path_factory.mktemp("chromium")) as chromium:
+        yield chromium

@@ -5,6 +5,8 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from kernel_source_harness import compiled
+from minmax_family import Found, found
 
 from optsat.arrays import Array
 from optsat.attitude.davenport import rotation_matrix, turn
@@ -13,8 +15,6 @@ from optsat.estimators.minmax_attitude import interval_losses, minmax_attitude
 from optsat.kernels.status import Status
 from optsat.studies import kernels_minmax_timing as study
 from optsat.studies.kernels_minmax_timing import ERROR, VECTORS, by_slsqp, draw_problems, ipopt, kernel_arguments
-from tests.conformance.kernel_source_harness import compiled
-from tests.conformance.minmax_family import Found, found
 
 N = 3 + VECTORS
 
@@ -27,7 +27,7 @@ def losses(answer: Found, problem: Array) -> Array:
     """By the attitude itself: |b + t radius - A([g; 1]) y|^2 / 2."""
     b_B, radius_B, y_B = problem
     A = rotation_matrix(turn(np.array([0.0, 0.0, 0.0, 1.0]), answer.x[:3]))
-    return 0.5 * np.sum((b_B + answer.x[3:, None] * radius_B - y_B @ A.T) ** 2, axis=1)
+    return np.asarray(0.5 * np.sum((b_B + answer.x[3:, None] * radius_B - y_B @ A.T) ** 2, axis=1))
 
 
 def test_a_thousand_problems(tmp_path: Path) -> None:

@@ -8,7 +8,20 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from optsat.commands import attitude, bench, cache, demo, doctor, export, simulate, study, study_report, verify, view
+from optsat.commands import (
+    attitude,
+    bench,
+    cache,
+    demo,
+    doctor,
+    export,
+    simulate,
+    study,
+    study_compare,
+    study_report,
+    verify,
+    view,
+)
 from optsat.commands.output import note
 from optsat.errors import OptsatError
 
@@ -62,6 +75,7 @@ app.command("export", epilog="Example: optsat export rigid_body_step --target co
     export.export_command
 )
 study.app.command("report", epilog="Example: optsat study report results --format pdf")(study_report.report_command)
+study.app.command("compare", epilog="Example: optsat study compare before after")(study_compare.compare_command)
 app.add_typer(study.app, name="study", epilog="Example: optsat study list")
 app.command("bench", epilog="Example: optsat bench kernels --json")(bench.bench_command)
 app.add_typer(cache.app, name="cache", epilog="Example: optsat cache show")

@@ -18,7 +18,7 @@ TOY = Path(__file__).parent / "campaign" / "toy_study.py"
 COMMANDS: tuple[list[str], ...] = (
     [],
     *(["demo"], ["attitude"], ["view"], ["verify"], ["simulate"]),
-    *(["study"], ["study", "list"], ["study", "run"], ["study", "report"]),
+    *(["study"], ["study", "list"], ["study", "run"], ["study", "report"], ["study", "compare"]),
     *(["export"], ["bench"], ["cache"], ["cache", "show"], ["cache", "clean"], ["doctor"]),
 )
 

@@ -4,15 +4,31 @@ from optsat.kernels.drivers import array_lengths, copies
 from optsat.kernels.source import KernelSource
 
 # vectors cross a call in memory only, since their passing in registers differs between machines
-_DRIVERS = """\
+_TILE = """\
 static __attribute__((noinline)) void {name}_tile(const os_lanes_real_t *x, os_lanes_real_t *y)
 {{
     {name}_lanes(x, y);
 }}
+"""
 
+_CALL = """\
+int32_t {name}_call(const os_real_t *const in[], os_real_t *const out[]);
+int32_t {name}_call(const os_real_t *const in[], os_real_t *const out[])
+{{
+    os_lanes_real_t x[{k_in}];
+    os_lanes_real_t y[{k_out}];
+{load}
+    {name}_tile(x, y);
+{store}
+    return (int32_t)OS_OK;
+}}
+"""
+
+_DRIVERS = """\
 OS_LANE os_lanes_real_t {name}_gathered(const os_real_t *in, int64_t first, int64_t last, int64_t stride)
 {{
     os_lanes_real_t r;
+    OS_UNROLLED
     for (int32_t w = 0; w < OS_WIDTH; ++w) {{
         r[w] = in[(((first + w) < last) ? (first + w) : last) * stride];
     }}
@@ -22,6 +38,7 @@ OS_LANE os_lanes_real_t {name}_gathered(const os_real_t *in, int64_t first, int6
 OS_LANE os_lanes_real_t {name}_gathered_whole(const os_real_t *in, int64_t first, int64_t stride)
 {{
     os_lanes_real_t r;
+    OS_UNROLLED
     for (int32_t w = 0; w < OS_WIDTH; ++w) {{
         r[w] = in[(first + w) * stride];
     }}
@@ -39,6 +56,7 @@ int64_t {name}_batch(int64_t n, const os_real_t *const in[], const int64_t strid
     for (; i <= (n - OS_WIDTH); i += OS_WIDTH) {{
 {load_whole}
         {name}_tile(x, y);
+        OS_UNROLLED
         for (int32_t w = 0; w < OS_WIDTH; ++w) {{
 {store}
         }}
@@ -69,6 +87,21 @@ void {name}_tiles(int64_t tiles, const os_real_t *const in[], const int64_t stri
     }}
 }}
 """
+
+
+def print_tile(source: KernelSource) -> str:
+    """Return NAME_tile, the lanes of a leaf over x and y."""
+    return _TILE.format(name=source.name)
+
+
+def print_call_of_tile(source: KernelSource) -> str:
+    """Return NAME_call, one sample as a tile of the same sample in every lane, which takes about as long."""
+    return _CALL.format(
+        name=source.name,
+        **array_lengths(source),
+        load=copies(source.inputs, "x[{at}] = os_lanes_constant(in[{p}][k]);", 1),
+        store=copies(source.outputs, "out[{p}][k] = y[{at}][0];", 1),
+    )
 
 
 def print_lane_drivers(source: KernelSource) -> str:

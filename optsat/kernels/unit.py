@@ -7,7 +7,7 @@ from optsat.kernels.drivers import print_batch, print_call
 from optsat.kernels.elementary import lanes_of
 from optsat.kernels.float_constants import check_float_constants
 from optsat.kernels.headers import header, headers_text, included, without_includes
-from optsat.kernels.lane_drivers import print_lane_drivers
+from optsat.kernels.lane_drivers import print_call_of_tile, print_lane_drivers, print_tile
 from optsat.kernels.source import KernelSource
 
 ABI = 1
@@ -17,6 +17,9 @@ Real = Literal["double", "float"]
 
 WIDTHS = (1, 2, 4, 8, 16)
 """Samples that one library computes at once."""
+
+LANES_ALONE = 4000
+"""Operations above which a single sample runs through the lanes too, so that the compiler has one form to compile."""
 
 
 def library_text(source: KernelSource, real: Real = "double", width: int = 1) -> str:
@@ -41,17 +44,18 @@ def library_text(source: KernelSource, real: Real = "double", width: int = 1) ->
     if real == "float":
         check_float_constants(source.name, source.body)
     in_lanes = width > 1 and bool(source.lanes)
+    lanes_alone = in_lanes and source.operations > LANES_ALONE
     names = included(source.body)
     return "\n".join(
         [
             *(["#define OS_REAL_IS_FLOAT"] if real == "float" else []),
             *([f"#define OS_WIDTH {width}"] if in_lanes else []),
             headers_text(["os_rt.h", *(["os_lanes.h"] if in_lanes else []), *names]),
-            without_includes(source.body),
-            *([*(lanes_of(header(name)) for name in names), source.lanes] if in_lanes else []),
+            *([] if lanes_alone else [without_includes(source.body)]),
+            *([*(lanes_of(header(name)) for name in names), source.lanes, print_tile(source)] if in_lanes else []),
             "extern const uint32_t os_abi;\nextern const uint32_t os_width;",
             f"const uint32_t os_abi = {ABI}U;\nconst uint32_t os_width = {width if in_lanes else 1}U;\n",
-            print_call(source),
+            print_call_of_tile(source) if lanes_alone else print_call(source),
             print_lane_drivers(source) if in_lanes else print_batch(source),
         ]
     )

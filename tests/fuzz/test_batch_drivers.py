@@ -13,6 +13,7 @@ from kernel_harness import any_compiler, on_machine
 from library_harness import Library, source_of
 
 from optsat.errors import InputError
+from optsat.kernels import unit
 from optsat.kernels.float_constants import check_float_constants
 from optsat.kernels.leaf import leaf_source
 from optsat.kernels.linear import cholesky_solve
@@ -95,6 +96,20 @@ def test_a_call_is_a_batch_of_one_and_may_overwrite_its_arguments(library: Libra
     pointers = (ctypes.c_void_p * 1)(x.ctypes.data)
     other.library.turned_call(pointers, pointers)
     np.testing.assert_array_equal(x, [3.0, 1.0, 3.0])
+
+
+def test_a_single_sample_of_a_large_kernel_runs_through_the_lanes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(unit, "LANES_ALONE", 0)
+    source = source_of(model())
+    assert "model_leaf" not in library_text(source, width=4)
+    given = arguments(np.random.default_rng(9), 5)
+    library = Library(source, any_compiler(), tmp_path, 4)
+    status, found = library.call([a[:1] for a in given])
+    assert status == 0
+    assert_same([f[np.newaxis] for f in found], expected([a[:1] for a in given], 1))
+    assert_same(library.batch(5, given, (3, 6, 1)), expected(given, 5))
 
 
 def test_resident_tiles_hold_the_same_numbers(library: Library) -> None:

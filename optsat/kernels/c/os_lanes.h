@@ -8,6 +8,13 @@
 /* how wide vectors are passed differs between machines; all functions here are inlined, so none is */
 #pragma GCC diagnostic ignored "-Wpsabi"
 
+/* gcc keeps short loops below -O3, and vectors that are indexed in a loop in memory */
+#if defined(__clang__)
+#define OS_UNROLLED
+#else
+#define OS_UNROLLED _Pragma("GCC unroll 16")
+#endif
+
 #define OS_LANE static inline __attribute__((always_inline, unused))
 #define OS_LANES_BYTES (OS_WIDTH * sizeof(os_real_t))
 
@@ -32,6 +39,7 @@ typedef struct {
 OS_LANE os_lanes_real_t os_lanes_constant(os_real_t a)
 {
     os_lanes_real_t r;
+    OS_UNROLLED
     for (int k = 0; k < OS_WIDTH; ++k) {
         r[k] = a;
     }
@@ -76,6 +84,7 @@ OS_LANE os_lanes_bool_t os_lanes_either(os_lanes_bool_t p, os_lanes_bool_t q)
 OS_LANE bool os_lanes_any(os_lanes_bool_t p)
 {
     os_bits_t found = 0U;
+    OS_UNROLLED
     for (int k = 0; k < OS_WIDTH; ++k) {
         found |= (os_bits_t)p[k];
     }
@@ -132,23 +141,25 @@ OS_LANE os_lanes_real_t os_lanes_fmin(os_lanes_real_t a, os_lanes_real_t b)
 }
 
 /* A function of one sample for each in turn; compilers make single instructions of the exact ones. */
-#define OS_EACH_OF_ONE(name, function)                              \
-    OS_LANE os_lanes_real_t os_lanes_##name(os_lanes_real_t a)      \
-    {                                                               \
-        os_lanes_real_t r;                                          \
-        for (int k = 0; k < OS_WIDTH; ++k) {                        \
-            r[k] = function(a[k]);                                  \
-        }                                                           \
-        return r;                                                   \
+#define OS_EACH_OF_ONE(name, function)                                              \
+    OS_LANE os_lanes_real_t os_lanes_##name(os_lanes_real_t a)                      \
+    {                                                                               \
+        os_lanes_real_t r;                                                          \
+        OS_UNROLLED                                                                 \
+        for (int k = 0; k < OS_WIDTH; ++k) {                                        \
+            r[k] = function(a[k]);                                                  \
+        }                                                                           \
+        return r;                                                                   \
     }
-#define OS_EACH_OF_TWO(name, function)                                                 \
-    OS_LANE os_lanes_real_t os_lanes_##name(os_lanes_real_t a, os_lanes_real_t b)      \
-    {                                                                                  \
-        os_lanes_real_t r;                                                             \
-        for (int k = 0; k < OS_WIDTH; ++k) {                                           \
-            r[k] = function(a[k], b[k]);                                               \
-        }                                                                              \
-        return r;                                                                      \
+#define OS_EACH_OF_TWO(name, function)                                              \
+    OS_LANE os_lanes_real_t os_lanes_##name(os_lanes_real_t a, os_lanes_real_t b)   \
+    {                                                                               \
+        os_lanes_real_t r;                                                          \
+        OS_UNROLLED                                                                 \
+        for (int k = 0; k < OS_WIDTH; ++k) {                                        \
+            r[k] = function(a[k], b[k]);                                            \
+        }                                                                           \
+        return r;                                                                   \
     }
 
 OS_EACH_OF_ONE(sqrt, os_sqrt)
@@ -179,6 +190,7 @@ OS_EACH_OF_TWO(libm_remainder, os_libm_remainder)
 
 OS_LANE os_lanes_angle_t os_lanes_reduced_where(os_lanes_bool_t large, os_lanes_real_t x, os_lanes_angle_t found)
 {
+    OS_UNROLLED
     for (int k = 0; k < OS_WIDTH; ++k) {
         if (large[k] != 0) {
             const os_angle_t angle = os_reduced_exactly(x[k]);

@@ -108,7 +108,7 @@ def by_slsqp(problem: Array) -> float:
         method="SLSQP",
         bounds=bounds,
         constraints=[{"type": "ineq", "fun": slack}],
-        options={"ftol": 1e-9, "maxiter": 200},
+        options={"ftol": 1e-10, "maxiter": 200},
     )
     return float(np.max(_losses(found.x[:-1], *problem)) / ERROR**2)
 

@@ -16,7 +16,8 @@ static os_real_t KERNEL_predict(KERNEL_work_t *work, os_real_t mu, os_real_t lea
     const os_real_t ratio = os_fmin(os_fmax(left / work->gap, (os_real_t)0), (os_real_t)1);
     /* far ahead of the residuals, the products would lose their balance and the steps their length */
     const os_real_t residual = os_fmax(work->dual_error, work->row_error);
-    const os_real_t balance = os_fmin((os_real_t)1e-4 * residual, (os_real_t)10 * mu);
+    const os_real_t share = os_fmin((os_real_t)1e-4, (os_real_t)1e-2 * residual);
+    const os_real_t balance = os_fmin(share * residual, (os_real_t)10 * mu);
     const os_real_t target = os_fmax(((ratio * ratio) * ratio) * mu, os_fmax(least, balance));
     for (int32_t p = 0; p < KERNEL_PAIRS; ++p) {
         work->change[p] = (work->product[p] - target) + (step->slack[p] * step->multiplier[p]);
@@ -64,7 +65,7 @@ static void KERNEL_iterate(KERNEL_work_t *work)
     bool going = true;
     for (int32_t k = 0; (k <= KERNEL_STEPS) && going; ++k) {
         KERNEL_residuals(work);
-        going = (k < KERNEL_STEPS) && !(work->error <= (work->tolerance * (os_real_t)0.125));
+        going = (k < KERNEL_STEPS) && !(work->error <= (work->tolerance * (os_real_t)0.25));
         if (going) {
             going = KERNEL_prepare(work) && (work->penalty < ((os_real_t)1 / OS_EPSILON));
         }

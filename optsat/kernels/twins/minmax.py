@@ -132,7 +132,7 @@ def _iterate(work: MinmaxWork) -> None:
     failures, barrier = 0, 0.0
     for k in range(STEPS + 1):
         take_residuals(work)
-        if k == STEPS or work.error <= TOLERANCE * 0.125 or not (prepare(work) and work.penalty < 1.0 / EPSILON):
+        if k == STEPS or work.error <= TOLERANCE * 0.25 or not (prepare(work) and work.penalty < 1.0 / EPSILON):
             return
         mu = work.gap / work.count
         least = ((0.0125 * TOLERANCE) * (1.0 + abs(work.now.gamma))) / work.count
@@ -160,7 +160,8 @@ def _predict(work: MinmaxWork, mu: float, least: float) -> tuple[MinmaxStep, flo
     slack, multiplier = work.now.slack + primal * step.slack, work.multiplier + dual * step.multiplier
     left = ordered_sum(slack * multiplier)
     ratio = float(fmin(fmax(left / work.gap, 0.0), 1.0))
-    balance = fmin(1e-4 * fmax(work.dual_error, work.row_error), 10.0 * mu)
+    residual = float(fmax(work.dual_error, work.row_error))
+    balance = fmin(fmin(1e-4, 1e-2 * residual) * residual, 10.0 * mu)
     target = float(fmax((ratio * ratio) * ratio * mu, fmax(least, balance)))
     change = (work.product - target) + step.slack * step.multiplier
     return direction(work, work.row_residual, change), target

@@ -64,6 +64,7 @@ def lmi(
             "M": m,
             "BLOCKS": len(sides),
             "SIDE": side,
+            "ORDER": len(sides) * side,
             "TRIANGLE": triangle,
             "PADDED": length,
             "LANES": LANES,

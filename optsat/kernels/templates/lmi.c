@@ -139,7 +139,7 @@ static int32_t KERNEL_judge(KERNEL_work_t *work)
 static bool KERNEL_repair(KERNEL_work_t *work)
 {
     const os_real_t scale = (os_real_t)1 / work->tau;
-    os_real_t mean = ((scale * scale) * work->gap) / (os_real_t)(KERNEL_BLOCKS * KERNEL_SIDE);
+    os_real_t mean = ((scale * scale) * work->gap) / (os_real_t)KERNEL_ORDER;
     bool going = true;
     for (int32_t i = 0; i < KERNEL_M; ++i) {
         work->x[i] = scale * work->x[i];
@@ -198,7 +198,10 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
             value = KERNEL_value(work->x, work);
             bound = lowest;
             const os_real_t size = ((os_real_t)1 + os_fabs(value)) + os_fabs(bound);
-            outcome = ((shown == 0) && ((value - bound) <= (enough * size))) ? 0 : 3;
+            outcome = 3;
+            if ((shown == 0) && ((value - bound) <= (enough * size))) {
+                outcome = 0;
+            }
         } else {
             outcome = 4;
         }
@@ -209,9 +212,15 @@ static os_status_t KERNEL_body(const os_real_t *x, os_real_t *y, KERNEL_work_t *
     y[KERNEL_M] = value;
     y[KERNEL_M + 1] = bound;
     y[KERNEL_M + 2] = (os_real_t)outcome;
-    os_status_t status = (outcome == 0) ? OS_OK : ((outcome >= 3) ? OS_E_NOT_CONVERGED : OS_E_RANGE);
+    os_status_t status = OS_E_NOT_CONVERGED;
     if (!finite) {
         status = OS_E_NOT_FINITE;
+    } else if (outcome == 0) {
+        status = OS_OK;
+    } else if (outcome < 3) {
+        status = OS_E_RANGE;
+    } else {
+        status = OS_E_NOT_CONVERGED;
     }
     return status;
 }

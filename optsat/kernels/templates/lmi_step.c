@@ -207,7 +207,7 @@ static bool KERNEL_advance(KERNEL_work_t *work)
         const os_real_t share = (os_real_t)1 - centring;
         KERNEL_transform(&work->slack_step, &work->multiplier_step, work, &work->correction);
         const os_real_t mean =
-            (work->gap + (work->tau * work->kappa)) / (os_real_t)((KERNEL_BLOCKS * KERNEL_SIDE) + 1);
+            (work->gap + (work->tau * work->kappa)) / ((os_real_t)KERNEL_ORDER + (os_real_t)1);
         KERNEL_find_step(centring * mean, share, work->tau_step * work->kappa_step, work);
         KERNEL_refine(share, work);
         const os_real_t reach = KERNEL_reach(KERNEL_HALVINGS, true, work);

@@ -9,9 +9,11 @@
 #ifdef OS_REAL_IS_FLOAT
 #define OS_HALF_PI_LOW ((os_real_t)-0x1.777a5cp-25)
 #define OS_ANGLE_WORDS 6
+#define OS_LARGEST_EXPONENT 254
 #else
 #define OS_HALF_PI_LOW ((os_real_t)0x1.1a62633145c07p-54)
 #define OS_ANGLE_WORDS 9
+#define OS_LARGEST_EXPONENT 2046
 #endif
 
 #if defined(__GNUC__)
@@ -52,12 +54,15 @@ static inline os_angle_t os_quarter_turns_to_angle(const uint32_t *words, int32_
     const os_real_t digit = (os_real_t)0x1p-16;
     os_real_t high = (os_real_t)0.0;
     os_real_t low = (os_real_t)0.0;
-    for (int32_t k = 0; k < (2 * n); ++k) {
-        const uint32_t word = words[k / 2];
-        const os_real_t next = (os_real_t)(((k % 2) == 0) ? (word & 0xFFFFU) : (word >> 16));
-        const os_real_t sum = next + high;
-        low = (low + (high - (sum - next))) * digit;
-        high = sum * digit;
+    for (int32_t k = 0; k < (2 * (OS_ANGLE_WORDS + 2)); ++k) {
+        if (k < (2 * n)) {
+            const uint32_t word = words[k / 2];
+            const uint32_t half = ((k % 2) == 0) ? (word & 0xFFFFU) : (word >> 16);
+            const os_real_t next = (os_real_t)half;
+            const os_real_t sum = next + high;
+            low = (low + (high - (sum - next))) * digit;
+            high = sum * digit;
+        }
     }
     const os_real_t head = os_from_bits(os_bits(high) & OS_HALF_MASK);
     const os_real_t tail = high - head;
@@ -77,12 +82,14 @@ static inline os_angle_t os_quarter_turns_to_angle(const uint32_t *words, int32_
 static OS_SELDOM os_angle_t os_reduced_exactly(os_real_t x)
 {
     const os_bits_t bits = os_bits(x);
-    const int32_t exponent = (int32_t)((bits >> OS_FRACTION_BITS) & ((2U * OS_BIAS) + 1U));
+    const os_bits_t biased = (bits >> OS_FRACTION_BITS) & ((2U * OS_BIAS) + 1U);
+    const os_bits_t fraction = bits & OS_FRACTION_MASK;
     /* x = mantissa * 2^(32 whole + part) */
-    const int32_t power = exponent - (int32_t)OS_BIAS - OS_FRACTION_BITS + 128;
+    const int32_t exponent = (int32_t)biased;
+    const int32_t power = exponent - (int32_t)OS_BIAS - (int32_t)OS_FRACTION_BITS + 128;
     const int32_t whole = (power / 32) - 4;
     const uint32_t part = (uint32_t)power % 32U;
-    const uint64_t mantissa = (uint64_t)((bits & OS_FRACTION_MASK) + OS_FRACTION_MASK) + 1U;
+    const uint64_t mantissa = ((uint64_t)fraction + (uint64_t)OS_FRACTION_MASK) + 1U;
     const uint64_t lower = (mantissa & 0xFFFFFFFFU) << part;
     const uint64_t upper = ((mantissa >> 32) << part) + (lower >> 32);
     const uint32_t factor[3] = {
@@ -90,9 +97,12 @@ static OS_SELDOM os_angle_t os_reduced_exactly(os_real_t x)
     };
     /* words of 2 / pi before this one give whole turns */
     const int32_t first = (whole > 1) ? (whole - 1) : 0;
-    uint32_t product[OS_ANGLE_WORDS + 3] = { 0U };
+    uint32_t product[OS_ANGLE_WORDS + 3];
     os_angle_t angle = { 0U, x - x, (os_real_t)0.0 };
-    if (exponent <= (int32_t)(2U * OS_BIAS)) {
+    product[0] = 0U;
+    product[1] = 0U;
+    product[2] = 0U;
+    if (exponent <= OS_LARGEST_EXPONENT) {
         for (int32_t i = 0; i < OS_ANGLE_WORDS; ++i) {
             const uint64_t word = os_word_of_two_over_pi((first + OS_ANGLE_WORDS) - 1 - i);
             uint64_t carry = 0U;
@@ -106,18 +116,21 @@ static OS_SELDOM os_angle_t os_reduced_exactly(os_real_t x)
         /* so many words stand behind the point */
         const int32_t n = (OS_ANGLE_WORDS + first) - whole;
         const uint32_t half = product[n - 1] >> 31;
-        if (half == 1U) {
+        const bool below = half == 1U;
+        if (below) {
             uint32_t borrow = 1U;
-            for (int32_t i = 0; i < n; ++i) {
-                product[i] = ~product[i] + borrow;
-                borrow = ((borrow == 1U) && (product[i] == 0U)) ? 1U : 0U;
+            for (int32_t i = 0; i < (OS_ANGLE_WORDS + 2); ++i) {
+                if (i < n) {
+                    product[i] = ~product[i] + borrow;
+                    borrow = (product[i] == 0U) ? borrow : 0U;
+                }
             }
         }
         angle = os_quarter_turns_to_angle(product, n);
         const bool negative = (bits >> OS_SIGN_BIT) != 0U;
-        const os_bits_t quarters = (os_bits_t)product[n] + half;
+        const os_bits_t quarters = (os_bits_t)product[n] + (os_bits_t)half;
         angle.quarters = negative ? (0U - quarters) : quarters;
-        if (negative != (half == 1U)) {
+        if (below != negative) {
             angle.high = -angle.high;
             angle.low = -angle.low;
         }

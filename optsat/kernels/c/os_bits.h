@@ -5,12 +5,10 @@
 
 #include "os_rt.h"
 
-#include <string.h>
-
 #ifdef OS_REAL_IS_FLOAT
 typedef uint32_t os_bits_t;
-#define OS_FRACTION_BITS 23
-#define OS_SIGN_BIT 31
+#define OS_FRACTION_BITS 23U
+#define OS_SIGN_BIT 31U
 #define OS_BIAS ((os_bits_t)127U)
 /* Added to a number, it rounds it to a whole one; the last bits of the sum are that number. */
 #define OS_ROUNDING ((os_real_t)0x1.8p23)
@@ -20,8 +18,8 @@ typedef uint32_t os_bits_t;
 #define OS_HALF_MASK ((os_bits_t)0xFFFFF000U)
 #else
 typedef uint64_t os_bits_t;
-#define OS_FRACTION_BITS 52
-#define OS_SIGN_BIT 63
+#define OS_FRACTION_BITS 52U
+#define OS_SIGN_BIT 63U
 #define OS_BIAS ((os_bits_t)1023U)
 #define OS_ROUNDING ((os_real_t)0x1.8p52)
 #define OS_ROUNDING_BITS ((os_bits_t)0x4338000000000000U)
@@ -29,18 +27,23 @@ typedef uint64_t os_bits_t;
 #define OS_HALF_MASK ((os_bits_t)0xFFFFFFFFF8000000U)
 #endif
 
+typedef union {
+    os_real_t real;
+    os_bits_t bits;
+} os_real_bits_t;
+
 static inline os_bits_t os_bits(os_real_t a)
 {
-    os_bits_t bits;
-    (void)memcpy(&bits, &a, sizeof bits);
-    return bits;
+    os_real_bits_t both;
+    both.real = a;
+    return both.bits;
 }
 
 static inline os_real_t os_from_bits(os_bits_t bits)
 {
-    os_real_t a;
-    (void)memcpy(&a, &bits, sizeof a);
-    return a;
+    os_real_bits_t both;
+    both.bits = bits;
+    return both.real;
 }
 
 static inline os_real_t os_select(bool p, os_real_t a, os_real_t b)

@@ -76,7 +76,7 @@ static inline os_real_t os_exp(os_real_t x)
     const os_real_t y = most + (more + (lost + ((r * r) * os_exponential_polynomial(r))));
     /* 2^n in two steps, so that only the last rounds, also where the result is denormal */
     const os_bits_t sum = (os_bits(shifted) - OS_ROUNDING_BITS) + (((os_bits_t)2U) * OS_BIAS);
-    const os_bits_t one = sum >> 1;
+    const os_bits_t one = sum >> 1U;
     const os_bits_t other = sum - one;
     return (y * os_from_bits(one << OS_FRACTION_BITS)) * os_from_bits(other << OS_FRACTION_BITS);
 }

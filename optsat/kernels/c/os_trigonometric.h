@@ -97,8 +97,8 @@ static inline os_sine_cosine_t os_sine_cosine(os_real_t x)
     const os_real_t lost = (((os_real_t)1.0) - most) - half;
     const os_real_t cosine = most + (lost + (((z * z) * os_cosine_polynomial(z)) - (r * angle.low)));
     const bool odd = (angle.quarters & ((os_bits_t)1U)) != ((os_bits_t)0U);
-    const os_bits_t sine_sign = (angle.quarters & ((os_bits_t)2U)) << (OS_SIGN_BIT - 1);
-    const os_bits_t cosine_sign = ((angle.quarters + ((os_bits_t)1U)) & ((os_bits_t)2U)) << (OS_SIGN_BIT - 1);
+    const os_bits_t sine_sign = (angle.quarters & ((os_bits_t)2U)) << (OS_SIGN_BIT - 1U);
+    const os_bits_t cosine_sign = ((angle.quarters + ((os_bits_t)1U)) & ((os_bits_t)2U)) << (OS_SIGN_BIT - 1U);
     os_sine_cosine_t found;
     const os_real_t signed_sine = os_from_bits(os_bits(os_select(odd, cosine, sine)) ^ sine_sign);
     found.sine = os_select(size <= ((os_real_t)0.0), x, signed_sine);

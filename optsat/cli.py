@@ -15,6 +15,7 @@ from optsat.commands import (
     demo,
     doctor,
     export,
+    reproduce,
     simulate,
     study,
     study_compare,
@@ -77,6 +78,7 @@ app.command("export", epilog="Example: optsat export rigid_body_step --target co
 study.app.command("report", epilog="Example: optsat study report results --format pdf")(study_report.report_command)
 study.app.command("compare", epilog="Example: optsat study compare before after")(study_compare.compare_command)
 app.add_typer(study.app, name="study", epilog="Example: optsat study list")
+app.command("reproduce", epilog="Example: optsat reproduce --out papers --resume")(reproduce.reproduce_command)
 app.command("bench", epilog="Example: optsat bench kernels --json")(bench.bench_command)
 app.add_typer(cache.app, name="cache", epilog="Example: optsat cache show")
 app.command("doctor", epilog="Example: optsat doctor --json")(doctor.doctor_command)

@@ -31,6 +31,7 @@ class Claim:
     says : the claim as a sentence, with the unit of its figure
     paper : the printed figure, or None where the bar is our own
     measured : the figure of this run; a word where the claim is not a number
+    interval : what the figure may be with other cases, at 95 % confidence, where the study says so
     """
 
     id: str
@@ -38,6 +39,7 @@ class Claim:
     paper: Figure | None
     measured: Figure
     verdict: Verdict
+    interval: tuple[float, float] | None = None
 
 
 def judge_paper(
@@ -48,20 +50,28 @@ def judge_paper(
     measured: float,
     tolerance: float,
     better: Literal["lower", "higher"] | None = None,
+    interval: tuple[float, float] | None = None,
 ) -> Claim:
     """Return the claim about a printed figure, judged by an absolute tolerance in the figure's own unit.
 
     REPRODUCED within `tolerance` of the paper; BEATEN further away on the `better` side; else NOT_REPRODUCED.
     A figure that is not finite is never reproduced.
+
+    interval : what the figure may be with other cases; all of it must be within the tolerance, or all of it on the
+        better side of the paper's figure, and where it is too wide to tell the claim says so
     """
+    low, high = interval if interval is not None else (measured, measured)
     gain = {"lower": paper - measured, "higher": measured - paper, None: -math.inf}[better]
-    if abs(measured - paper) <= tolerance:
+    excludes = {"lower": high < paper, "higher": low > paper, None: False}[better]
+    if max(abs(measured - paper), abs(low - paper), abs(high - paper)) <= tolerance:
         verdict = Verdict.REPRODUCED
-    elif gain > tolerance and math.isfinite(measured):
+    elif gain > tolerance and excludes and math.isfinite(measured):
         verdict = Verdict.BEATEN
     else:
         verdict = Verdict.NOT_REPRODUCED
-    return Claim(id, says, paper, measured, verdict)
+        if low <= paper + tolerance and high >= paper - tolerance:
+            says = f"{says}; its interval is too wide to tell, take more cases"
+    return Claim(id, says, paper, measured, verdict, interval)
 
 
 def judge_bar(id: str, says: str, *, measured: Figure, holds: bool) -> Claim:

@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optsat.campaign.claim import Claim, Verdict
+from optsat.campaign.manifest import Manifest
 from optsat.campaign.result import Failure
 from optsat.campaign.run_folder import COMPLETE, Identity
 from optsat.campaign.store import FIGURE, RESULT, SUMMARY, check_files
 from optsat.errors import InputError, OptsatError
 
 _RUN = "run.json"
+_PRINTS = ("numerics", "other numerics")
 Read = TypeVar("Read")
 
 
@@ -28,6 +30,7 @@ class FinishedRun:
     metrics : figures; NaN where one was not finite
     columns : scalars of the cases that ran, the case's number first, each (cases that ran,)
     digests : size and SHA-256 of each of its files
+    numerics : prints of the arithmetic that computed it, the first chunk's first; one where all bits are comparable
     provenance : of the start; no result depends on it
     """
 
@@ -39,6 +42,7 @@ class FinishedRun:
     failures: tuple[Failure, ...]
     columns: Mapping[str, NDArray[Any]]
     digests: Mapping[str, Mapping[str, Any]]
+    numerics: tuple[str, ...]
     provenance: Mapping[str, Any]
 
     @property
@@ -100,6 +104,7 @@ def read_run(path: Path) -> FinishedRun:
         end.failures,
         _columns(path / SUMMARY),
         end.digests,
+        tuple(dict.fromkeys(e["print"] for e in Manifest(path / "manifest").read() if e["event"] in _PRINTS)),
         start.provenance,
     )
 
@@ -149,7 +154,10 @@ def _document(path: Path, read: Callable[[Any], Read]) -> Read:
 
 def _claim(claim: Mapping[str, Any]) -> Claim:
     measured = math.nan if claim["measured"] is None else claim["measured"]
-    return Claim(str(claim["id"]), str(claim["says"]), claim["paper"], measured, Verdict(claim["verdict"]))
+    interval = None if claim["interval"] is None else tuple(_number(end) for end in claim["interval"])
+    if interval is not None and len(interval) != 2:
+        raise ValueError(f"the interval {interval} of a claim has no two ends")
+    return Claim(str(claim["id"]), str(claim["says"]), claim["paper"], measured, Verdict(claim["verdict"]), interval)
 
 
 def _number(value: float | None) -> float:

@@ -52,6 +52,7 @@ class StudyResult:
                 "paper": _json_figure(claim.paper),
                 "measured": _json_figure(claim.measured),
                 "verdict": claim.verdict.value,
+                "interval": None if claim.interval is None else [_json_figure(end) for end in claim.interval],
             }
             for claim in self.claims
         ]

@@ -30,6 +30,8 @@ class Study:
     default_cases : number of cases when none is asked for
     figure : (rows, path to write) -> None, where the study draws one
     version : raised whenever the same seed gives other rows
+    paper : whose printed figures it judges; `optsat reproduce` runs these. Empty for bars of our own, and where times
+        are judged, which depend on the load of the machine
     """
 
     name: str
@@ -41,6 +43,7 @@ class Study:
     default_cases: int
     figure: Callable[[Sequence[Row], Path], None] | None = None
     version: int = 1
+    paper: str = ""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", self.name):

@@ -14,6 +14,7 @@ Columns = Mapping[str, NDArray[Any]]
 _DIGITS = 6
 _LEAST_BYTES, _MOST_BYTES, _BYTES_A_CASE = 380_000, 2_500_000, 38
 _EXTREMES_SHARE = 0.2
+_MEASURED, _SURELY_MORE, _MARGIN = 1000, 1.1, 0.95
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,19 @@ def case_table(columns: Columns, run: str) -> CaseTable:
     """
     cases = len(columns["case"])
     budget = min(max(_LEAST_BYTES, _BYTES_A_CASE * cases), _MOST_BYTES)
-    text = _as_json(columns, cases)
-    if len(text) <= budget:
-        return CaseTable(text, cases, cases)
-    rows = _chosen(columns, max(1, int(0.97 * budget * cases / len(text))), run)
-    return CaseTable(_as_json({name: column[rows] for name, column in columns.items()}, len(rows)), len(rows), cases)
+    few = _rows(columns, np.unique(np.linspace(0, cases - 1, min(cases, _MEASURED)).round().astype(np.int64)))
+    size = len(_as_json(few, len(few["case"]))) * cases / len(few["case"])
+    if size <= _SURELY_MORE * budget:
+        text = _as_json(columns, cases)
+        if len(text) <= budget:
+            return CaseTable(text, cases, cases)
+        size = len(text)
+    rows = _chosen(columns, max(1, int(_MARGIN * budget * cases / size)), run)
+    return CaseTable(_as_json(_rows(columns, rows), len(rows)), len(rows), cases)
+
+
+def _rows(columns: Columns, rows: NDArray[np.int64]) -> Columns:
+    return {name: column[rows] for name, column in columns.items()}
 
 
 def _chosen(columns: Columns, count: int, run: str) -> NDArray[np.int64]:

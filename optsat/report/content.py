@@ -44,7 +44,10 @@ def claim_row(claim: Claim) -> tuple[str, str, str, str]:
 
 def measured_words(claim: Claim) -> str:
     """Return the measured figure, with its interval where there is one."""
-    return figure_words(claim.measured)
+    if claim.interval is None:
+        return figure_words(claim.measured)
+    low, high = (figure_words(end) for end in claim.interval)
+    return f"{figure_words(claim.measured)} ({low} to {high})"
 
 
 def headline(claims: Sequence[Claim], cases: int, failed: int) -> str:
@@ -53,8 +56,18 @@ def headline(claims: Sequence[Claim], cases: int, failed: int) -> str:
     if not claims:
         return f"{ran}; no claim was judged."
     counts = {verdict: sum(claim.verdict is verdict for claim in claims) for verdict in Verdict}
-    found = [f"{count} {_counted(verdict, count)}" for verdict, count in counts.items() if count]
+    found = [f"{count} {counted_verdict(verdict, count)}" for verdict, count in counts.items() if count]
     return f"{ran}. Claims: {', '.join(found)}."
+
+
+def caution(run: FinishedRun) -> str:
+    """Return what a reader must know before the figures; empty where there is nothing."""
+    if len(run.numerics) > 1:
+        return (
+            "Machines whose arithmetic differs in the last bits took part: another run of this is not comparable bit "
+            "by bit, only within a tolerance."
+        )
+    return ""
 
 
 def metric_rows(run: FinishedRun) -> Rows:
@@ -79,7 +92,7 @@ def provenance_rows(run: FinishedRun) -> Rows:
     """Return where it was computed, and the digests of its files."""
     said = [(name, _provenance_words(value)) for name, value in run.provenance.items()]
     files = [(name, f"{digest['bytes']} bytes, SHA-256 {digest['sha256']}") for name, digest in run.digests.items()]
-    return said + files
+    return [*said, ("numerics", ", ".join(run.numerics)), *files]
 
 
 def failure_rows(failures: Sequence[Failure]) -> list[tuple[str, str, str, str]]:
@@ -95,7 +108,8 @@ def failure_rows(failures: Sequence[Failure]) -> list[tuple[str, str, str, str]]
     return rows
 
 
-def _counted(verdict: Verdict, count: int) -> str:
+def counted_verdict(verdict: Verdict, count: int) -> str:
+    """Return the verb that follows a number of claims."""
     words = verdict_words(verdict)
     return words.removesuffix("s") if count > 1 else words
 

@@ -19,7 +19,8 @@ def html_report(run: FinishedRun) -> str:
     parts = [
         f'<header><h1>{escape(run.title)}</h1><p class="quiet">{escape(identity.study)}, version {identity.version}, '
         f"seed {identity.seed}, optsat {escape(identity.optsat)}</p>"
-        f'<p class="lead">{content.headline(run.claims, identity.cases, len(run.failures))}</p></header>',
+        f'<p class="lead">{content.headline(run.claims, identity.cases, len(run.failures))}</p>'
+        f"<p>{content.caution(run)}</p></header>",
         _section("Claims", claim_table(run.claims)) if run.claims else "",
         _section("Figures", _figures(drawings(run))),
         _section("Metrics", pairs(content.metric_rows(run))) if run.metrics else "",

@@ -18,6 +18,7 @@ def markdown_report(run: FinishedRun, stem: str) -> tuple[str, dict[str, bytes]]
         f"# {_plain(run.title)}",
         f"{_plain(identity.study)}, version {identity.version}, seed {identity.seed}, optsat {identity.optsat}. "
         + content.headline(run.claims, identity.cases, len(run.failures)),
+        *([caution] if (caution := content.caution(run)) else []),
     ]
     if run.claims:
         parts += ["## Claims", _table(content.CLAIM_HEADS, [content.claim_row(claim) for claim in run.claims])]

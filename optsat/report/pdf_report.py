@@ -66,6 +66,7 @@ def _lines(run: FinishedRun) -> Iterator[str]:
     yield from (f"# {line}" for line in textwrap.wrap(run.title, 60))
     yield f"{identity.study}, version {identity.version}, seed {identity.seed}, optsat {identity.optsat}"
     yield content.headline(run.claims, identity.cases, len(run.failures))
+    yield from textwrap.wrap(content.caution(run), _WIDTH)
     tables: list[tuple[str, Sequence[Sequence[str]]]] = [
         ("Claims", [content.CLAIM_HEADS, *(content.claim_row(claim) for claim in run.claims)] if run.claims else []),
         ("Metrics", content.metric_rows(run)),

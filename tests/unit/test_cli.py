@@ -19,7 +19,7 @@ COMMANDS: tuple[list[str], ...] = (
     [],
     *(["demo"], ["attitude"], ["view"], ["verify"], ["simulate"]),
     *(["study"], ["study", "list"], ["study", "run"], ["study", "report"], ["study", "compare"]),
-    *(["export"], ["bench"], ["cache"], ["cache", "show"], ["cache", "clean"], ["doctor"]),
+    *(["export"], ["reproduce"], ["bench"], ["cache"], ["cache", "show"], ["cache", "clean"], ["doctor"]),
 )
 
 
@@ -127,7 +127,7 @@ def test_study_run_prints_one_json_document() -> None:
     document = json.loads(result.stdout)
     assert list(document) == ["study", "version", "seed", "cases", "metrics", "claims", "failures"]
     assert [document[name] for name in ("study", "version", "seed", "cases", "failures")] == ["toy-study", 1, 4, 3, 0]
-    assert list(document["claims"][0]) == ["id", "says", "paper", "measured", "verdict"]
+    assert list(document["claims"][0]) == ["id", "says", "paper", "measured", "verdict", "interval"]
     assert [claim["verdict"] for claim in document["claims"]] == ["REPRODUCED", "HOLDS"]
 
 

@@ -31,6 +31,20 @@ def test_it_is_what_was_run(tmp_path: Path) -> None:
     assert set(run.digests) == {"summary.csv", "result.nc", "figure.svg"}
 
 
+def test_a_mixture_of_machines_is_said(tmp_path: Path) -> None:
+    from optsat.campaign.manifest import Manifest
+    from optsat.report.content import caution
+
+    run_study(toy_study.study, cases=3, out=tmp_path)
+    alone = read_run(tmp_path)
+    assert len(alone.numerics) == 1
+    assert caution(alone) == ""
+    Manifest(tmp_path / "manifest").append("other numerics", print="f" * 16, chunk=0)
+    mixed = read_run(tmp_path)
+    assert mixed.numerics == (*alone.numerics, "f" * 16)
+    assert "not comparable bit by bit" in caution(mixed)
+
+
 def test_arrays_come_from_the_final_file(tmp_path: Path) -> None:
     def run(case: Any, rng: np.random.Generator) -> Any:
         if case["offset"] == 1:

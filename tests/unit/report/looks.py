@@ -36,17 +36,24 @@ return seen;
 
 def contrast(pixels: NDArray[np.uint8]) -> float:
     """Return the contrast ratio of the lightest and the darkest pixel."""
-    part = pixels.reshape(-1, 3) / 255
-    linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
-    luminance = linear @ (0.2126, 0.7152, 0.0722)
-    return float((luminance.max() + 0.05) / (luminance.min() + 0.05))
+    return _ratio(_luminance(pixels))
 
 
 def text_contrasts(browser: Chromium) -> NDArray[np.float64]:
     """Return the contrast of each piece of text in the window, letters of figures among them."""
     boxes = browser.script(_BOXES)
-    shot = browser.picture()
-    return np.array([contrast(shot[int(t) : int(b) + 1, int(le) : int(r) + 1]) for le, t, r, b in boxes])
+    shot = _luminance(browser.picture())
+    return np.array([_ratio(shot[int(t) : int(b) + 1, int(le) : int(r) + 1]) for le, t, r, b in boxes])
+
+
+def _ratio(luminance: NDArray[np.float64]) -> float:
+    return float((luminance.max() + 0.05) / (luminance.min() + 0.05))
+
+
+def _luminance(pixels: NDArray[np.uint8]) -> NDArray[np.float64]:
+    levels = np.arange(256) / 255
+    linear = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
+    return np.asarray(linear[pixels] @ (0.2126, 0.7152, 0.0722))
 
 
 def assert_readable(browser: Chromium) -> None:

@@ -88,7 +88,7 @@ def test_words_sort_and_pages_turn(browser: Chromium, report: Path) -> None:
 def test_text_and_figures_are_readable_in_light_and_dark(browser: Chromium, report: Path, columns_report: Path) -> None:
     for page in (report, columns_report):
         browser.open(page)
-        browser.resize(1100, browser.script("return document.documentElement.scrollHeight"))
+        browser.resize(1100, min(2400, browser.script("return document.documentElement.scrollHeight")))
         assert_readable(browser)
         boxes = browser.script(
             "return [...document.querySelectorAll('svg')].map(s => s.getBoundingClientRect())"
@@ -108,7 +108,7 @@ def test_text_and_figures_are_readable_in_light_and_dark(browser: Chromium, repo
 
 def test_black_text_on_a_dark_page_would_be_noticed(browser: Chromium, report: Path) -> None:
     browser.open(report)
-    browser.resize(1100, browser.script("return document.documentElement.scrollHeight"))
+    browser.resize(1100, min(2400, browser.script("return document.documentElement.scrollHeight")))
     browser.dark(True)
     browser.script("for (const g of document.querySelectorAll('svg .text')) g.style.fill = 'black'")
     assert text_contrasts(browser).min() < VISIBLE

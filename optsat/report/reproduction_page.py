@@ -59,12 +59,14 @@ def _claims(judged: Sequence[tuple[Reproduction, Claim]]) -> str:
     for each, claim in judged:
         says, paper, measured, verdict = (escape(word) for word in content.claim_row(claim))
         assert each.run is not None
+        printed = cell("Paper", paper) if claim.paper is not None else ""
         rows.append(
-            f'<tr><td class="says">{says}</td>{cell("Paper", paper)}{cell("Measured", measured)}'
+            f'<tr><td class="says">{says}</td>{printed}{cell("Measured", measured)}'
             f'<td data-label="Verdict">{chip(claim.verdict.value, verdict)}</td>'
             f'<td class="wide" data-label="Command"><code>{escape(each.run.command)}</code></td></tr>'
         )
-    return f'<table class="stack">{head(_HEADS)}<tbody>{"".join(rows)}</tbody></table>'
+    heads = [name for name in _HEADS if name != "Paper" or judged[0][1].paper is not None]
+    return f'<table class="stack">{head(heads)}<tbody>{"".join(rows)}</tbody></table>'
 
 
 def _lost(lost: Sequence[Reproduction]) -> str:

@@ -1,6 +1,7 @@
 """Certified attitude: attitude from a fixed number of vectors, and the angle that its error never exceeds."""
 
 import math
+from dataclasses import replace
 
 from optsat.kernels.instantiate import instantiate
 from optsat.kernels.sizes import check_size
@@ -14,6 +15,8 @@ FEWEST, MOST = 2, 10
 """Numbers of vectors that are offered."""
 LENGTH_TOLERANCE = 0.05
 """Deviation of a vector's length from one that flight code counts, as a sign of a sensor gone wrong."""
+# the bound hardly depends on the weights near the best ones, so that rounding moves them far
+_FLOAT_ULP = 65536.0
 # one iteration of the search; a call takes 6 to 12 as a rule
 _OPERATIONS, _OPERATIONS_A_VECTOR = 5500, 260
 
@@ -45,7 +48,7 @@ def certified_attitude(vectors: int = 4, iterations: int = 40) -> KernelSource:
     """
     n = check_size("certified_attitude", "vectors", vectors, FEWEST, MOST)
     check_size("certified_attitude", "iterations", iterations, 1, 100)
-    return instantiate(
+    source = instantiate(
         "certified_attitude",
         f"certified_attitude_{n}",
         leaves={},
@@ -72,3 +75,4 @@ def certified_attitude(vectors: int = 4, iterations: int = 40) -> KernelSource:
         twin=certified_twin.twin(n, iterations),
         operations=_OPERATIONS + _OPERATIONS_A_VECTOR * n,
     )
+    return replace(source, float_ulp=_FLOAT_ULP)

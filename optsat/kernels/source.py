@@ -25,6 +25,8 @@ class KernelSource:
     libm : the C functions used whose last bits depend on the machine
     operations : arithmetic operations of one sample, or of one iteration where they are not fixed
     twin : the same in plain Python, where no C compiler is; None for a leaf, which CasADi runs
+    float_ulp : how far a result in single precision may be from that of double, in units in the last place of the
+        largest number that it has; more than usual where an iteration ends at rounding
     """
 
     name: str
@@ -36,6 +38,7 @@ class KernelSource:
     libm: tuple[str, ...] = ()
     operations: int = 0
     twin: Twin | None = None
+    float_ulp: float = 4096.0
 
     @property
     def is_exact(self) -> bool:

@@ -185,12 +185,12 @@ static void KERNEL_weigh(KERNEL_work_t *work)
     }
 }
 
-/* Keep the ball of the present weights where it is the smallest so far, or proves that there is none. */
+/* Keep the ball of the present weights where it is the smallest so far, or proves that no attitude is admissible. */
 static void KERNEL_keep(KERNEL_work_t *work)
 {
     const KERNEL_ball_t *ball = &work->ball;
     const bool smaller = ball->bounded && (ball->tangent_square < work->best.tangent_square);
-    if (!work->best.empty && (ball->empty || smaller || !work->best.bounded)) {
+    if (!work->best.empty && (ball->empty || smaller)) {
         work->best = *ball;
         for (int32_t i = 0; i < KERNEL_N; ++i) {
             work->best_weight[i] = work->weight[i];

@@ -122,7 +122,7 @@ def _search(pairs: Pairs, iterations: int) -> tuple[Ball, list[float]]:
         weights = found
         ball = enclose(pairs, weights)
         smaller = ball.bounded and ball.tangent_square < best.tangent_square
-        if ball.empty or smaller or not best.bounded:
+        if ball.empty or smaller:
             best, best_weights = ball, weights
         if not (ball.bounded and ball.tangent_square < 0.1 * (programme.scale * programme.scale)):
             break

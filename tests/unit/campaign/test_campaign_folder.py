@@ -1,5 +1,6 @@
 """A run folder against everything that happens to one: kills at every step, damage, other runs, a second runner."""
 
+import functools
 import itertools
 import json
 import multiprocessing
@@ -31,7 +32,8 @@ def chunks_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(folder: Path, **options: Any) -> None:
-    run_study(toy_study.study, cases=CASES, out=folder, **({"seed": 3} | options))
+    seeded: dict[str, Any] = {"seed": 3} | options
+    run_study(toy_study.study, cases=CASES, out=folder, **seeded)
 
 
 def final_bytes(folder: Path) -> dict[str, bytes]:
@@ -68,7 +70,7 @@ def test_a_kill_at_any_step_loses_nothing(tmp_path: Path, undisturbed: dict[str,
     """Every step of a campaign: open, half a write, sync, rename, half a line, each part of the final files."""
     for step in itertools.count(1):
         folder = tmp_path / str(step)
-        if not killed_after(step, lambda folder=folder: run(folder)):  # type: ignore[misc]
+        if not killed_after(step, functools.partial(run, folder)):
             break
         before = {name: (folder / "chunks" / name).stat().st_mtime_ns for name in finished_chunks(folder)}
         run(folder, resume=True)

@@ -12,6 +12,10 @@
 #error "compile without -ffast-math: NaN, signed zeros and the order of operations are part of the results"
 #endif
 
+#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD != 0)
+#error "compile for an arithmetic without excess digits, such as -mfpmath=sse: they would change the results"
+#endif
+
 #ifdef OS_REAL_IS_FLOAT
 typedef float os_real_t;
 #define OS_EPSILON FLT_EPSILON

@@ -23,7 +23,11 @@ REQUIRED = (
     "threadpoolctl",
     "typer",
 )
-EXTRAS = {"results": ("h5netcdf", "h5py", "xarray"), "cluster": ("distributed",), "peers": ("ahrs", "bsk", "filterpy", "stonesoup")}
+EXTRAS = {
+    "results": ("h5netcdf", "h5py", "xarray"),
+    "cluster": ("distributed",),
+    "peers": ("ahrs", "bsk", "filterpy", "stonesoup"),
+}
 
 
 class Health(enum.Enum):

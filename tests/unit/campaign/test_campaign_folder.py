@@ -68,6 +68,7 @@ def finished_chunks(folder: Path) -> set[str]:
 
 def test_a_kill_at_any_step_loses_nothing(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
     """Every step of a campaign: open, half a write, sync, rename, half a line, each part of the final files."""
+    step = 0
     for step in itertools.count(1):
         folder = tmp_path / str(step)
         if not killed_after(step, functools.partial(run, folder)):

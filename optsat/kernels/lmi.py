@@ -71,6 +71,8 @@ def lmi(
             "ENTRIES": m + (m + 1) * entries,
             "ITERATIONS": iterations,
             "HALVINGS": lmi_twin.HALVINGS,
+            "FINE": lmi_twin.FINE,
+            "COARSE": lmi_twin.COARSE,
             "REPAIRS": lmi_twin.REPAIRS,
             "ROUNDOFFS": lmi_twin.roundoffs(m, side),
         },

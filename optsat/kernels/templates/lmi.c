@@ -43,6 +43,7 @@ typedef struct {
     os_real_t gap;
     os_real_t constant;
     os_real_t margin;
+    bool is_near;
     os_real_t schur[KERNEL_M][KERNEL_M];
     os_real_t pivot[KERNEL_M];
     os_real_t right[KERNEL_M];
@@ -121,14 +122,14 @@ static int32_t KERNEL_judge(KERNEL_work_t *work)
     work->constant = work->drawn[0];
     const os_real_t constant = work->constant;
     const os_real_t size = (work->tau + os_fabs(value)) + os_fabs(constant);
-    KERNEL_combine((os_real_t)0, work->x, work, &work->image);
-    KERNEL_add((os_real_t)-1, &work->slack, &work->image);
-    const os_real_t moved = KERNEL_largest(&work->image);
     KERNEL_combine(work->tau, work->x, work, &work->rest);
     KERNEL_add((os_real_t)-1, &work->slack, &work->rest);
+    const os_real_t rest = KERNEL_largest(&work->rest);
+    const os_real_t moved = rest + (work->tau * os_fmax(work->largest[0], (os_real_t)1));
+    work->is_near = work->gap <= (((os_real_t)0.001 * size) * work->tau);
     const bool close = (work->gap <= ((enough * size) * work->tau)) && ((value + constant) <= (enough * size));
     const bool met = (unmet <= ((enough * work->cost_size) * work->tau)) &&
-        (KERNEL_largest(&work->rest) <= ((enough * work->slack_size) * work->tau));
+        (rest <= ((enough * work->slack_size) * work->tau));
     const bool infeasible = (constant < (os_real_t)0) && (drawn <= (enough * -constant));
     const bool unbounded = (value < (os_real_t)0) && (moved <= (enough * -value));
     return (close && met) ? 0 : (infeasible ? 1 : (unbounded ? 2 : 3));
@@ -165,7 +166,7 @@ static bool KERNEL_repair(KERNEL_work_t *work)
             work->steepness = OS_REAL_MAX;
             KERNEL_clear_correction(work);
             KERNEL_find_step(mean, (os_real_t)1, (os_real_t)0, work);
-            const os_real_t reach = KERNEL_reach(KERNEL_HALVINGS, false, work);
+            const os_real_t reach = KERNEL_reach(KERNEL_FINE, false, work);
             (void)KERNEL_move((reach >= (os_real_t)1) ? reach : ((os_real_t)0.9 * reach), work);
             mean = (os_real_t)4 * mean;
         }

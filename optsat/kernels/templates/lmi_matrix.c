@@ -166,25 +166,23 @@ static void KERNEL_transform(const KERNEL_blocks_t *m, const KERNEL_blocks_t *ot
     }
 }
 
-/* Whether m + length * step is positive definite. */
-static bool KERNEL_is_definite(const KERNEL_blocks_t *m, const KERNEL_blocks_t *step, os_real_t length)
+/* Whether a block of m + length * step is positive definite. */
+static bool KERNEL_is_definite(int32_t block, const KERNEL_blocks_t *m, const KERNEL_blocks_t *step, os_real_t length)
 {
+    os_real_t rest[KERNEL_SIDE][KERNEL_SIDE];
     bool definite = true;
-    for (int32_t b = 0; (b < KERNEL_BLOCKS) && definite; ++b) {
-        os_real_t rest[KERNEL_SIDE][KERNEL_SIDE];
-        for (int32_t i = 0; i < KERNEL_SIDE; ++i) {
-            for (int32_t j = 0; j <= i; ++j) {
-                rest[i][j] = m->at[b][i][j] + (length * step->at[b][i][j]);
-            }
+    for (int32_t i = 0; i < KERNEL_SIDE; ++i) {
+        for (int32_t j = 0; j <= i; ++j) {
+            rest[i][j] = m->at[block][i][j] + (length * step->at[block][i][j]);
         }
-        for (int32_t j = 0; j < KERNEL_SIDE; ++j) {
-            definite = definite && (rest[j][j] > (os_real_t)0);
-            const os_real_t reciprocal = (os_real_t)1 / (definite ? rest[j][j] : (os_real_t)1);
-            for (int32_t i = j + 1; i < KERNEL_SIDE; ++i) {
-                const os_real_t factor = rest[i][j] * reciprocal;
-                for (int32_t k = j + 1; k <= i; ++k) {
-                    rest[i][k] -= factor * rest[k][j];
-                }
+    }
+    for (int32_t j = 0; j < KERNEL_SIDE; ++j) {
+        definite = definite && (rest[j][j] > (os_real_t)0);
+        const os_real_t reciprocal = (os_real_t)1 / (definite ? rest[j][j] : (os_real_t)1);
+        for (int32_t i = j + 1; i < KERNEL_SIDE; ++i) {
+            const os_real_t factor = rest[i][j] * reciprocal;
+            for (int32_t k = j + 1; k <= i; ++k) {
+                rest[i][k] -= factor * rest[k][j];
             }
         }
     }
@@ -201,7 +199,11 @@ static bool KERNEL_holds(const os_real_t *x, KERNEL_work_t *work)
     KERNEL_combine((os_real_t)1, x, work, &work->image);
     work->margin = (((os_real_t)0.5 * (os_real_t)KERNEL_ROUNDOFFS) * OS_EPSILON) * size;
     KERNEL_raise(-work->margin, &work->image);
-    return KERNEL_is_definite(&work->image, &work->image, (os_real_t)0);
+    bool holds = true;
+    for (int32_t b = 0; b < KERNEL_BLOCKS; ++b) {
+        holds = holds && KERNEL_is_definite(b, &work->image, &work->image, (os_real_t)0);
+    }
+    return holds;
 }
 
 /* Inverse of every block by Cholesky's method; false where one is not positive definite. */

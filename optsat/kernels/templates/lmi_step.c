@@ -144,26 +144,41 @@ static void KERNEL_refine(os_real_t share, KERNEL_work_t *work)
     KERNEL_add((os_real_t)-1, &work->image, &work->multiplier_step);
 }
 
-/* The longest of a few step lengths up to 1 that keeps the slack, and the multiplier where asked, positive definite;
-   0 where none does. */
+/* The longest of a few step lengths up to a limit that keeps every block positive definite; more are tried as long as
+   none does, and then it is 0. */
+static os_real_t KERNEL_reach_of(const KERNEL_blocks_t *m, const KERNEL_blocks_t *step, os_real_t limit,
+    int32_t halvings)
+{
+    os_real_t reach = limit;
+    for (int32_t b = 0; b < KERNEL_BLOCKS; ++b) {
+        os_real_t inside = (os_real_t)0;
+        os_real_t outside = reach;
+        os_real_t length = reach;
+        bool open = true;
+        for (int32_t k = 1; (k <= KERNEL_HALVINGS) && open; ++k) {
+            const bool stays = KERNEL_is_definite(b, m, step, length);
+            inside = stays ? length : inside;
+            outside = stays ? outside : length;
+            length = (os_real_t)0.5 * (inside + outside);
+            open = (inside < outside) && ((k < halvings) || (inside <= (os_real_t)0));
+        }
+        reach = inside;
+    }
+    return reach;
+}
+
+/* How much of the step slack, tau and kappa can go, and the multiplier where asked. */
 static os_real_t KERNEL_reach(int32_t halvings, bool of_multiplier, const KERNEL_work_t *work)
 {
     const os_real_t none = (os_real_t)0;
     const os_real_t end_of_tau = (work->tau_step < none) ? -(work->tau / work->tau_step) : (os_real_t)1;
     const os_real_t end_of_kappa = (work->kappa_step < none) ? -(work->kappa / work->kappa_step) : (os_real_t)1;
-    os_real_t outside = os_fmin(os_fmin((os_real_t)1, end_of_tau), end_of_kappa);
-    os_real_t inside = none;
-    os_real_t length = outside;
-    bool open = true;
-    for (int32_t k = 0; (k < halvings) && open; ++k) {
-        const bool stays = KERNEL_is_definite(&work->slack, &work->slack_step, length) &&
-            ((!of_multiplier) || KERNEL_is_definite(&work->multiplier, &work->multiplier_step, length));
-        inside = stays ? length : inside;
-        outside = stays ? outside : length;
-        length = (os_real_t)0.5 * (inside + outside);
-        open = inside < outside;
+    os_real_t reach = os_fmin(os_fmin((os_real_t)1, end_of_tau), end_of_kappa);
+    reach = KERNEL_reach_of(&work->slack, &work->slack_step, reach, halvings);
+    if (of_multiplier) {
+        reach = KERNEL_reach_of(&work->multiplier, &work->multiplier_step, reach, halvings);
     }
-    return inside;
+    return reach;
 }
 
 /* Go the step; false, and stay, where the length is zero: the step may then be no number. */
@@ -202,15 +217,17 @@ static bool KERNEL_advance(KERNEL_work_t *work)
         KERNEL_centre(work);
         KERNEL_clear_correction(work);
         KERNEL_find_step((os_real_t)0, (os_real_t)1, (os_real_t)0, work);
-        const os_real_t left = (os_real_t)1 - KERNEL_reach(KERNEL_HALVINGS / 2, true, work);
+        const os_real_t left = (os_real_t)1 - KERNEL_reach(KERNEL_COARSE, true, work);
         const os_real_t centring = (left * left) * left;
         const os_real_t share = (os_real_t)1 - centring;
         KERNEL_transform(&work->slack_step, &work->multiplier_step, work, &work->correction);
         const os_real_t mean =
             (work->gap + (work->tau * work->kappa)) / ((os_real_t)KERNEL_ORDER + (os_real_t)1);
         KERNEL_find_step(centring * mean, share, work->tau_step * work->kappa_step, work);
-        KERNEL_refine(share, work);
-        const os_real_t reach = KERNEL_reach(KERNEL_HALVINGS, true, work);
+        if (work->is_near) {
+            KERNEL_refine(share, work);
+        }
+        const os_real_t reach = KERNEL_reach(KERNEL_FINE, true, work);
         const os_real_t length = ((os_real_t)0.9 + ((os_real_t)0.09 * reach)) * reach;
         going = KERNEL_move(length, work);
     }

@@ -13,7 +13,7 @@ from optsat.kernels.sizes import LANES, padded
 from optsat.kernels.source import Twin
 from optsat.kernels.status import Status
 
-HALVINGS = 12
+HALVINGS, FINE, COARSE = 14, 8, 5
 REPAIRS = 8
 _EPSILON = sys.float_info.epsilon
 _STATUS = (Status.OK, Status.RANGE, Status.RANGE, Status.NOT_CONVERGED, Status.NOT_CONVERGED)
@@ -93,11 +93,13 @@ class _Programme:
         self.gap = _inner(self.slack, self.multiplier)
         self.constant = constant = float(pulls[0])
         size = (self.tau + abs(value)) + abs(constant)
-        moved = _largest(self._combined(0.0, self.x) - self.slack)
         self.rest = self._combined(self.tau, self.x) - self.slack
+        rest = _largest(self.rest)
+        moved = rest + self.tau * max(float(self.largest[0]), 1.0)
+        self.is_near = self.gap <= (0.001 * size) * self.tau
         close = self.gap <= (enough * size) * self.tau and value + constant <= enough * size
         dual = unmet <= (enough * self.cost_size) * self.tau
-        if close and dual and _largest(self.rest) <= (enough * self.slack_size) * self.tau:
+        if close and dual and rest <= (enough * self.slack_size) * self.tau:
             return 0
         if constant < 0.0 and drawn <= enough * -constant:
             return 1
@@ -109,13 +111,14 @@ class _Programme:
             return False
         self._centre(inverse)
         step = self._step(inverse, 0.0, 1.0, np.zeros_like(self.slack), 0.0)
-        left = 1.0 - self._reach(step, HALVINGS // 2)
+        left = 1.0 - self._reach(step, COARSE)
         centring = (left * left) * left
         correction = _transformed(inverse, step.slack, step.multiplier)
         mean = (self.gap + self.tau * self.kappa) / float(self.blocks * self.side + 1)
         step = self._step(inverse, centring * mean, 1.0 - centring, correction, step.tau * step.kappa)
-        self._refine(inverse, step, 1.0 - centring)
-        length = self._reach(step, HALVINGS)
+        if self.is_near:
+            self._refine(inverse, step, 1.0 - centring)
+        length = self._reach(step, FINE)
         length = (0.9 + 0.09 * length) * length
         if length > 0.0:
             self._move(step, length)
@@ -187,20 +190,11 @@ class _Programme:
         step.multiplier = step.multiplier - _transformed(inverse, change, self.multiplier)
 
     def _reach(self, step: "_Step", halvings: int, of_multiplier: bool = True) -> float:
-        outside = 1.0
+        reach = 1.0
         for value, change in ((self.tau, step.tau), (self.kappa, step.kappa)):
-            outside = min(outside, -(value / change)) if change < 0.0 else outside
-        inside, length = 0.0, outside
-        for _ in range(halvings):
-            definite = _is_definite(self.slack + length * step.slack)
-            if definite and (not of_multiplier or _is_definite(self.multiplier + length * step.multiplier)):
-                inside = length
-            else:
-                outside = length
-            length = 0.5 * (inside + outside)
-            if not inside < outside:
-                break
-        return inside
+            reach = min(reach, -(value / change)) if change < 0.0 else reach
+        reach = _reach_of(self.slack, step.slack, reach, halvings)
+        return _reach_of(self.multiplier, step.multiplier, reach, halvings) if of_multiplier else reach
 
     def _substituted(self, right: Array) -> Array:
         step = right.copy()
@@ -217,7 +211,7 @@ class _Programme:
         for each in (np.abs(x) * self.largest[1:]).tolist():
             size += each
         self.margin = ((0.5 * roundoffs(self.m, self.side)) * _EPSILON) * size
-        return _is_definite(self._combined(1.0, x) - self.margin * np.eye(self.side))
+        return all(map(_is_definite, self._combined(1.0, x) - self.margin * np.eye(self.side)))
 
     def _repair(self) -> bool:
         scale = 1.0 / self.tau
@@ -238,7 +232,7 @@ class _Programme:
             self._centre(inverse)
             self.steepness = sys.float_info.max
             step = self._step(inverse, mean, 1.0, np.zeros_like(self.slack), 0.0)
-            length = self._reach(step, HALVINGS, of_multiplier=False)
+            length = self._reach(step, FINE, of_multiplier=False)
             if length > 0.0:
                 self._move(step, length if length >= 1.0 else 0.9 * length)
             mean = 4.0 * mean
@@ -307,15 +301,27 @@ def _largest(m: Array) -> float:
     return float(np.fmax.reduce(np.abs(m).ravel(), initial=0.0))
 
 
-def _is_definite(m: Array) -> bool:
-    rest = m.copy()
-    n = m.shape[-1]
-    for j in range(n):
-        if not (rest[:, j, j] > 0.0).all():
+def _reach_of(m: Array, step: Array, reach: float, halvings: int) -> float:
+    for block, change in zip(m, step, strict=True):
+        inside, outside, length = 0.0, reach, reach
+        for k in range(1, HALVINGS + 1):
+            if _is_definite(block + length * change):
+                inside = length
+            else:
+                outside = length
+            length = 0.5 * (inside + outside)
+            if not (inside < outside and (k < halvings or inside <= 0.0)):
+                break
+        reach = inside
+    return reach
+
+
+def _is_definite(rest: Array) -> bool:
+    for j in range(len(rest)):
+        if not rest[j, j] > 0.0:
             return False
-        column = rest[:, j + 1 :, j]
-        factor = column * (1.0 / rest[:, j, j])[:, None]
-        rest[:, j + 1 :, j + 1 :] -= factor[:, :, None] * column[:, None, :]
+        factor = rest[j + 1 :, j] * (1.0 / rest[j, j])
+        rest[j + 1 :, j + 1 :] -= factor[:, None] * rest[j + 1 :, j]
     return True
 
 

@@ -1,15 +1,13 @@
 """Options, profiles and fixtures shared by all tests."""
 
+import importlib
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pytest
 from hypothesis import settings
-
-if TYPE_CHECKING:
-    from chromium import Chromium
 
 settings.register_profile("optsat", deadline=None, print_blob=True)
 settings.load_profile("optsat")
@@ -75,10 +73,10 @@ def _kernels_of_the_tests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 
 @pytest.fixture(scope="session")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Chromium]":
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A Chromium that has never been used."""
     # beside the tests of the report, whose folder is on the path once they are collected
-    from chromium import started
+    started = importlib.import_module("chromium").started
 
     with started(tmp_path_factory.mktemp("chromium")) as chromium:
         yield chromium

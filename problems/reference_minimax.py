@@ -1,5 +1,6 @@
 """Min-max problems of the literature in closed form."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -295,7 +296,7 @@ MINIMAX = (
         lambda x: [_exp(x[0] ** 2 / 1000 + (x[1] - 1) ** 2), _exp(x[0] ** 2 / 1000 + (x[1] + 1) ** 2)],
         (50, 0.05),
         2.7182818,
-        np.e,
+        math.e,
         "Polak, Mayne & Higgins (1991)",
         convex=True,
     ),

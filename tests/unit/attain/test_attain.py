@@ -62,7 +62,7 @@ def closed_loop(K: Array) -> Array:
     """Return the real parts, ascending, of the eigenvalues of A + B K C of the classical pole placement."""
     A = np.array([[-0.5, 0, 0], [0, -2, 10], [0, 1, -2]])
     B, C = np.array([[1.0, 0], [-2, 2], [0, 1]]), np.array([[1.0, 0, 0], [0, 0, 1]])
-    return np.sort(np.linalg.eigvals(A + B @ K.reshape(2, 2) @ C).real)
+    return np.sort(np.linalg.eigvals(A + B @ K.reshape(2, 2) @ C).real).astype(np.float64)
 
 
 def test_pole_placement_of_the_classical_solver() -> None:

@@ -1,9 +1,12 @@
 """Files: written so that no crash leaves half of one."""
 
+import contextlib
 import os
 import secrets
 import signal
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 CRASH_AFTER = "OPTSAT_CRASH_AFTER"
 """Environment variable of the tests: the number of durable steps after which the process kills itself."""
@@ -24,13 +27,23 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
 
     mode : permissions of the file, less those that the process withholds
     """
+    with atomic_stream(path, mode) as stream:
+        stream.write(data[: len(data) // 2])
+        durable_step()
+        stream.write(data[len(data) // 2 :])
+
+
+@contextlib.contextmanager
+def atomic_stream(path: Path, mode: int = 0o666) -> Iterator[BinaryIO]:
+    """Yield a stream whose bytes become the file `path`, all of them or none, once it is left without an error.
+
+    mode : permissions of the file, less those that the process withholds
+    """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
         with open(temporary, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as stream:
             durable_step()
-            stream.write(data[: len(data) // 2])
-            durable_step()
-            stream.write(data[len(data) // 2 :])
+            yield stream
             stream.flush()
             durable_step()
             os.fsync(stream.fileno())

@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
 from optsat.campaign.result import Failure
-from optsat.campaign.study import Row
+from optsat.campaign.table import Table
 from optsat.campaign.threads import one_thread_each, one_thread_here
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What became of some cases, in case order, and the print of the arithmetic that computed them."""
+    """What became of some consecutive cases, and the print of the arithmetic that computed them."""
 
-    cases: list[Row | Failure]
+    table: Table
     numerics: str
 
 
@@ -108,14 +108,13 @@ class Processes:
 def crashed(case: int) -> Outcomes:
     """Return the outcome of a case that kills every worker."""
     died = Failure(case, "CRASHED", "the worker process that ran this case died (killed, or out of memory)")
-    return Outcomes([died], "")
+    return Outcomes(Table({}, (died,)), "")
 
 
 def joined(parts: Sequence[Outcomes]) -> Outcomes:
     """Return the outcomes of consecutive cases as one."""
-    return Outcomes(
-        [outcome for part in parts for outcome in part.cases], next((p.numerics for p in parts if p.numerics), "")
-    )
+    numerics = next((part.numerics for part in parts if part.numerics), "")
+    return Outcomes(Table.joined("that is run", [part.table for part in parts]), numerics)
 
 
 def _alone(task: Task, numbers: range) -> Outcomes:

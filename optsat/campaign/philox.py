@@ -14,10 +14,11 @@ _ROUNDS = 10
 _LOW, _HALF = np.uint64(0xFFFFFFFF), np.uint64(32)
 
 
-def philox_words(key: int, cells: NDArray[np.int64], count: int, stream: int = 0) -> Words:
-    """Return the first `count` words (cells, count) of Philox(key = (campaign key, cell), counter = (0, 0, stream, 0)).
+def philox_words(key: int, cells: NDArray[np.int64], count: int, stream: int = 0, first: int = 0) -> Words:
+    """Return `count` words (cells, count) of Philox(key = (campaign key, cell), counter = (0, 0, stream, 0)).
 
     key : 64-bit key of the campaign; cells : places in the design, >= 0; stream : number of the draw
+    first : words that are left out before
 
     Raises
     ------
@@ -25,11 +26,12 @@ def philox_words(key: int, cells: NDArray[np.int64], count: int, stream: int = 0
     Source: J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3 (2011), Philox4x64-10.
     """
     cells = np.asarray(cells)
-    if count < 0 or stream < 0 or not 0 <= key < 1 << 64 or (cells.size and cells.min() < 0):
-        raise InputError("`cells`, `count` and `stream` must be >= 0 and `key` below 2^64.")
-    blocks = -(-count // 4)
+    if min(count, stream, first) < 0 or not 0 <= key < 1 << 64 or (cells.size and cells.min() < 0):
+        raise InputError("`cells`, `count`, `stream` and `first` must be >= 0 and `key` below 2^64.")
+    before, skipped = divmod(first, 4)
+    blocks = -(-(skipped + count) // 4)
     # NumPy counts up before the first block
-    counter = np.arange(1, blocks + 1, dtype=np.uint64)
+    counter = np.arange(before + 1, before + blocks + 1, dtype=np.uint64)
     shape = (len(cells), blocks)
     x = [np.broadcast_to(counter, shape), np.zeros(shape, np.uint64), np.full(shape, stream, np.uint64)]
     x.append(np.zeros(shape, np.uint64))
@@ -39,7 +41,7 @@ def philox_words(key: int, cells: NDArray[np.int64], count: int, stream: int = 0
         high_1, low_1 = _product(_MULTIPLIERS[1], x[2])
         x = [high_1 ^ x[1] ^ k[0], low_1, high_0 ^ x[3] ^ k[1], low_0]
         k = [k[0] + _WEYL[0], k[1] + _WEYL[1]]
-    return np.stack(x, axis=-1).reshape(len(cells), 4 * blocks)[:, :count]
+    return np.stack(x, axis=-1).reshape(len(cells), 4 * blocks)[:, skipped : skipped + count]
 
 
 def uniforms(words: Words) -> Array:

@@ -1,7 +1,7 @@
 """StudyResult: rows, metrics and claims of one run, and the plain dictionary that is printed and stored."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,8 @@ class Failure:
 class StudyResult:
     """What `run_study` returns.
 
-    rows : one per case that succeeded, in case order, with the case's number under "case"
+    rows : one per case that succeeded, in case order, with the case's number under "case"; of a large run in a folder
+        read from there as they are asked for
     failures : one per case that raised; rows and failures together hold every case once
     metrics, claims : empty when no case succeeded
     """
@@ -33,7 +34,7 @@ class StudyResult:
     version: int
     seed: int
     cases: int
-    rows: tuple[Row, ...]
+    rows: Sequence[Row]
     metrics: Mapping[str, float]
     claims: tuple[Claim, ...]
     failures: tuple[Failure, ...]

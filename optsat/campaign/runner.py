@@ -10,26 +10,25 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from optsat._version import __version__
+from optsat.campaign.case_runs import run_cases
+from optsat.campaign.designs import Layout
 from optsat.campaign.executors import Chunk, Executor, Outcomes, Processes, Serial, Task
 from optsat.campaign.numerics import numerics_print
 from optsat.campaign.provenance import provenance
-from optsat.campaign.result import Failure, StudyResult
+from optsat.campaign.result import StudyResult
+from optsat.campaign.rows import Cases, read_cases
 from optsat.campaign.run_folder import Identity, RunFolder, open_run
-from optsat.campaign.seeds import campaign_key, case_generator
-from optsat.campaign.store import finish, finished_result
-from optsat.campaign.study import Case, Row, Study
+from optsat.campaign.seeds import campaign_key
+from optsat.campaign.store import check_finished, finish
+from optsat.campaign.study import Study
 from optsat.campaign.table import Table
-from optsat.errors import InputError, OptsatError
-
-# What a computation may raise on unlucky data. Anything else (a TypeError, a misspelt name) is a mistake in the
-# study and stops the campaign with its traceback.
-_CASE_ERRORS = (OptsatError, ArithmeticError, ValueError, RuntimeError)
+from optsat.errors import InputError
 
 _CHUNK_S = 2.0
 _WARM_S = 1.0
+_CHUNK_BYTES = 1 << 26
+_BATCH = 256
 _MOST_CASES_A_CHUNK = 4096
 _LEAST_CHUNKS_A_WORKER = 4
 
@@ -69,20 +68,18 @@ def run_study(
             "`cases` and `workers` must be at least 1 and `seed` at least 0, "
             f"got cases={count}, workers={workers}, seed={seed}."
         )
-    design = study.cases(count)
-    if len(design) != count:
-        raise InputError(f"study {study.name} laid out {len(design)} cases where {count} were asked for.")
+    layout = Layout.of(study.name, study.cases, count, campaign_key(study.name, seed))
     if executor is None:
         executor = Processes(workers) if workers > 1 else Serial()
-    task = _task(study, design, count, seed, executor)
+    task = _task(study, layout, seed, executor)
     if out is None:
         chunks = _chunks(count, max(1, min(64, count // (8 * workers))) if workers > 1 else 1)
         tables: dict[int, Table] = {}
         for chunk, outcomes in _reported(executor.run(task, chunks), progress, count, 0):
-            tables[chunk.index] = Table.of(study.name, outcomes.cases)
-        return _assembled(study, seed, count, [tables[index] for index in sorted(tables)])
+            tables[chunk.index] = outcomes.table
+        return _judged(study, seed, count, read_cases(study.name, tables.__getitem__, len(chunks)))
     identity = Identity(study.name, study.version, seed, count, __version__, _source_hash(study))
-    size = functools.partial(_chunk_size, study, design, seed, workers)
+    size = functools.partial(_chunk_size, study, layout, workers)
     with open_run(out, identity, size, provenance(sys.argv), resume, mixed_machines) as folder:
         return _run_in_folder(study, seed, count, executor, task, folder, progress)
 
@@ -90,23 +87,25 @@ def run_study(
 def _run_in_folder(
     study: Study, seed: int, count: int, executor: Executor, task: Task, folder: RunFolder, progress: Progress | None
 ) -> StudyResult:
-    def tables() -> Iterator[Table]:
-        return (Table.from_arrays(folder.load(index)) for index in range(folder.count))
+    def cases() -> Cases:
+        return read_cases(study.name, lambda chunk: Table.from_arrays(folder.load(chunk)), folder.count)
 
     if folder.is_complete():
-        return finished_result(study, folder, _assembled(study, seed, count, list(tables())))
+        check_finished(folder)
+        return _judged(study, seed, count, cases())
     chunks = _chunks(count, folder.chunk_size)
     missing = [chunk for chunk in chunks if chunk.index not in folder.finished]
     done = count - sum(len(chunk.numbers) for chunk in missing)
     try:
         for chunk, outcomes in _reported(executor.run(task, missing), progress, count, done):
             folder.check_numerics(outcomes.numerics, chunk.index)
-            folder.store(chunk.index, Table.of(study.name, outcomes.cases).to_arrays())
+            folder.store(chunk.index, outcomes.table.to_arrays())
     except KeyboardInterrupt:
         folder.manifest.append("interrupted", finished=len(folder.finished))
         raise
-    result = _assembled(study, seed, count, list(tables()))
-    finish(study, folder, result, tables)
+    done_cases = cases()
+    result = _judged(study, seed, count, done_cases)
+    finish(study, folder, result, done_cases)
     return result
 
 
@@ -121,33 +120,34 @@ def _reported(
                 progress(done, count)
 
 
-def _assembled(study: Study, seed: int, count: int, tables: Sequence[Table]) -> StudyResult:
-    table = Table.joined(study.name, tables)
-    rows = table.rows()
-    metrics = dict(study.metrics(rows)) if rows else {}
-    claims = tuple(study.claims(metrics)) if rows else ()
-    return StudyResult(study.name, study.version, seed, count, rows, metrics, claims, table.failures)
+def _judged(study: Study, seed: int, count: int, cases: Cases) -> StudyResult:
+    metrics = dict(study.metrics(cases.rows)) if cases.rows else {}
+    claims = tuple(study.claims(metrics)) if cases.rows else ()
+    return StudyResult(study.name, study.version, seed, count, cases.rows, metrics, claims, cases.failures)
 
 
 def _chunks(count: int, size: int) -> list[Chunk]:
     return [Chunk(index, range(first, min(first + size, count))) for index, first in enumerate(range(0, count, size))]
 
 
-def _chunk_size(study: Study, design: Sequence[Case], seed: int, workers: int) -> int:
-    """Return cases for about two seconds of work, from the time of the first case; no result depends on it."""
+def _chunk_size(study: Study, layout: Layout, workers: int) -> int:
+    """Return cases for about two seconds of work or 64 MB, from the first case; no result depends on it."""
     numerics_print()
-    second = _second_of_first_case(study, design, seed)
+    second, size = _cost_a_case(study, layout, 1)
     if second < _WARM_S:
-        # the first run of a short case is mostly imports
-        second = _second_of_first_case(study, design, seed)
-    most = max(1, len(design) // (_LEAST_CHUNKS_A_WORKER * workers))
-    return max(1, min(most, _MOST_CASES_A_CHUNK, round(_CHUNK_S / max(second, 1e-9))))
+        # the first run of a short case is mostly imports; a batch shows its speed with many
+        second, size = _cost_a_case(study, layout, min(layout.count, _BATCH if study.run_batch is not None else 1))
+    most = max(1, layout.count // (_LEAST_CHUNKS_A_WORKER * workers))
+    by_time = round(_CHUNK_S / max(second, 1e-9))
+    return max(1, min(most, _MOST_CASES_A_CHUNK, by_time, int(_CHUNK_BYTES // max(size, 1.0))))
 
 
-def _second_of_first_case(study: Study, design: Sequence[Case], seed: int) -> float:
+def _cost_a_case(study: Study, layout: Layout, cases: int) -> tuple[float, float]:
+    """Return seconds and bytes a case."""
     start = time.perf_counter()
-    _run_cases(study, design, seed, range(1))
-    return time.perf_counter() - start
+    table = run_cases(study, layout, range(cases)).table
+    second = time.perf_counter() - start
+    return second / cases, sum(column.nbytes for column in table.columns.values()) / cases
 
 
 def _source_hash(study: Study) -> str:
@@ -155,49 +155,23 @@ def _source_hash(study: Study) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file is not None else ""
 
 
-def _run_cases(study: Study, design: Sequence[Case], seed: int, numbers: Sequence[int]) -> Outcomes:
-    key = campaign_key(study.name, seed)
-    outcomes: list[Row | Failure] = []
-    for number in numbers:
-        try:
-            row = study.run(design[number], case_generator(key, number))
-        except _CASE_ERRORS as error:
-            outcomes.append(Failure(number, type(error).__name__, str(error)))
-        else:
-            outcomes.append({"case": number, **{name: _value(study, number, name, row[name]) for name in row}})
-    return Outcomes(outcomes, numerics_print())
-
-
-def _value(study: Study, number: int, name: str, value: object) -> object:
-    if isinstance(value, np.ndarray) and value.dtype.kind in "bif":
-        return value
-    plain = value.item() if isinstance(value, np.generic) else value
-    if not isinstance(plain, float | int | str | bool):
-        raise InputError(
-            f"study {study.name}: case {number} returned `{name}` of type {type(plain).__name__}. "
-            "A row holds numbers, words, truth values and arrays of numbers only."
-        )
-    return plain
-
-
-def _task(study: Study, design: Sequence[Case], count: int, seed: int, executor: Executor) -> Task:
+def _task(study: Study, layout: Layout, seed: int, executor: Executor) -> Task:
     if isinstance(executor, Serial):
-        return functools.partial(_run_cases, study, design, seed)
+        return functools.partial(run_cases, study, layout)
     module = study.run.__module__
     if getattr(importlib.import_module(module), "study", None) is not study:
         raise InputError(
             f"study {study.name} cannot run in worker processes: they import `study` from the module of its `run` "
             f"function, and {module} holds another object or none. Define it there or use workers=1."
         )
-    return functools.partial(_run_imported, module, count, seed)
+    return functools.partial(_run_imported, module, layout.count, seed)
 
 
 def _run_imported(module: str, count: int, seed: int, numbers: Sequence[int]) -> Outcomes:
-    study, design = _imported(module, count)
-    return _run_cases(study, design, seed, numbers)
+    return run_cases(*_imported(module, count, seed), numbers)
 
 
 @functools.lru_cache(maxsize=1)
-def _imported(module: str, count: int) -> tuple[Study, Sequence[Case]]:
+def _imported(module: str, count: int, seed: int) -> tuple[Study, Layout]:
     study: Study = importlib.import_module(module).study
-    return study, study.cases(count)
+    return study, Layout.of(study.name, study.cases, count, campaign_key(study.name, seed))

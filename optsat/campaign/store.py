@@ -3,38 +3,40 @@
 result.nc      every case, where the extra `results` is installed
 summary.csv    every case as text
 figure.svg     where the study draws one
-complete.json  last: digests of all these, the summary with its claims, failed cases
+complete.json  last: digests of all these and of the content, the summary with its claims, failed cases
 """
 
 import csv
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
+from optsat.campaign.case_blocks import case_blocks, content_hash, result_kinds
 from optsat.campaign.final_file import write_final_file
 from optsat.campaign.result import StudyResult
+from optsat.campaign.rows import Cases
 from optsat.campaign.run_folder import COMPLETE, RunFolder
 from optsat.campaign.study import Study
-from optsat.campaign.table import Table
 from optsat.errors import OptsatError
-from optsat.files import write_atomically
+from optsat.files import atomic_stream, durable_step, write_atomically
 
 RESULT, SUMMARY, FIGURE = "result.nc", "summary.csv", "figure.svg"
 
 
-def finish(study: Study, folder: RunFolder, result: StudyResult, tables: Callable[[], Iterator[Table]]) -> None:
+def finish(study: Study, folder: RunFolder, result: StudyResult, cases: Cases) -> None:
     """Write the final files of a run whose chunks are all there."""
     written = [SUMMARY]
     if find_spec("h5netcdf") is not None:
         attributes = {"study": study.name, "version": study.version, "seed": result.seed}
-        write_final_file(folder.path / RESULT, tables, result.cases, attributes)
+        write_final_file(folder.path / RESULT, cases, result.cases, attributes)
         written.append(RESULT)
-    write_atomically(folder.path / SUMMARY, _rows_as_csv(result).encode())
+    with atomic_stream(folder.path / SUMMARY) as stream:
+        _write_csv(stream, cases, result.cases)
     if study.figure is not None and result.rows:
         study.figure(result.rows, folder.path / FIGURE)
         written.append(FIGURE)
@@ -43,21 +45,21 @@ def finish(study: Study, folder: RunFolder, result: StudyResult, tables: Callabl
         "title": study.title,
         **result.summary(),
         "failed_cases": [asdict(failure) for failure in result.failures],
+        "content": content_hash(cases, result.cases),
         "files": {name: _digest(folder.path / name) for name in sorted(written)},
     }
     write_atomically(folder.path / COMPLETE, (json.dumps(document, indent=2, allow_nan=False) + "\n").encode())
     folder.manifest.append("finished")
 
 
-def finished_result(study: Study, folder: RunFolder, result: StudyResult) -> StudyResult:
-    """Return the result of a complete run after checking the digests of its files.
+def check_finished(folder: RunFolder) -> None:
+    """Check the digests of the files of a complete run.
 
     Raises
     ------
     OptsatError : a file has changed or is gone.
     """
     check_files(folder.path, json.loads((folder.path / COMPLETE).read_text(encoding="utf-8")))
-    return result
 
 
 def check_files(path: Path, document: Mapping[str, Any]) -> None:
@@ -84,16 +86,19 @@ def _digest(file: Path) -> dict[str, Any]:
     return {"bytes": size, "sha256": sha256.hexdigest()}
 
 
-def _rows_as_csv(result: StudyResult) -> str:
-    first = result.rows[0] if result.rows else {}
-    columns = [name for name, value in first.items() if name != "case" and not hasattr(value, "shape")]
-    lines: dict[Any, list[Any]] = {
-        row["case"]: [row["case"], "", *(row[name] for name in columns)] for row in result.rows
-    }
-    for failure in result.failures:
-        lines[failure.case] = [failure.case, f"{failure.error}: {failure.message}", *[""] * len(columns)]
+def _write_csv(stream: BinaryIO, cases: Cases, count: int) -> None:
+    names = [name for name, kind in result_kinds(cases).items() if not kind.shape]
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(["case", "failure", *columns])
-    table.writerows(lines[case] for case in sorted(lines))
-    return text.getvalue()
+    table.writerow(["case", "failure", *names])
+    for start, block in case_blocks(cases, count):
+        stop = start + len(block["status"])
+        lists = [range(start, stop), block["failure"], *(block[name].tolist() for name in names)]
+        table.writerows(
+            (line[0], line[1], *[""] * len(names)) if failed else line
+            for failed, line in zip(block["status"].tolist(), zip(*lists, strict=True), strict=True)
+        )
+        stream.write(text.getvalue().encode())
+        text.seek(0)
+        text.truncate()
+    durable_step()

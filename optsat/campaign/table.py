@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,24 @@ from optsat.campaign.study import Row
 from optsat.errors import InputError
 
 _FAILED = "failed/"
+_PLAIN = {float: "f", int: "i", bool: "b", str: "U"}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a column holds in all cases of a run; shape : of one case; case : the first one that showed it."""
+
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+    case: int
+
+    @property
+    def kind(self) -> str:
+        """NumPy's letter: f, i, b or U."""
+        return self.dtype.kind
+
+
+Kinds: TypeAlias = Mapping[str, Kind]
 
 
 @dataclass(frozen=True)
@@ -62,15 +80,23 @@ class Table:
         ------
         InputError : they hold different columns.
         """
-        full = [table for table in tables if table.columns]
-        for table in full:
-            first, this = full[0].columns, table.columns
-            _check_same(study, first, first["case"][0], this, this["case"][0])
-            for name in first:
-                _check_shapes(study, name, {first[name].shape[1:], this[name].shape[1:]})
-        names = list(full[0].columns) if full else []
-        columns = {name: np.concatenate([table.columns[name] for table in full]) for name in names}
+        kinds: Kinds = {}
+        for table in tables:
+            kinds = joined_kinds(study, kinds, table)
+        full = [table.of_kinds(kinds) for table in tables if table.columns]
+        columns = {name: np.concatenate([table.columns[name] for table in full]) for name in kinds}
         return Table(columns, tuple(failure for table in tables for failure in table.failures))
+
+    def of_kinds(self, kinds: "Kinds") -> "Table":
+        """Return this table with whole numbers as numbers where the run has numbers."""
+        columns = {
+            n: c if n not in kinds or c.dtype.kind == kinds[n].kind else c.astype(kinds[n].dtype)
+            for n, c in self.columns.items()
+        }
+        return Table(columns, self.failures)
+
+    def __len__(self) -> int:
+        return len(self.columns["case"]) if self.columns else 0
 
     def rows(self) -> tuple[Row, ...]:
         """Return one row a succeeded case: plain numbers, words and truth values, and arrays where there are any."""
@@ -78,12 +104,38 @@ class Table:
         return tuple(dict(zip(lists, values, strict=True)) for values in zip(*lists.values(), strict=True))
 
 
+def joined_kinds(study: str, kinds: Kinds, table: Table) -> Kinds:
+    """Return the kinds of the columns of tables seen so far and of one more.
+
+    Raises
+    ------
+    InputError : it holds other columns, another shape, or another kind than whole numbers beside numbers.
+    """
+    if not table.columns:
+        return kinds
+    case = int(table.columns["case"][0])
+    if not kinds:
+        return {name: Kind(column.dtype, column.shape[1:], case) for name, column in table.columns.items()}
+    _check_same(study, kinds, kinds["case"].case, table.columns, case)
+    return {name: _joined_kind(study, name, kind, table.columns[name]) for name, kind in kinds.items()}
+
+
+def _joined_kind(study: str, name: str, kind: Kind, column: NDArray[Any]) -> Kind:
+    _check_shapes(study, name, {kind.shape, column.shape[1:]})
+    if column.dtype.kind == kind.kind:
+        return kind
+    _check_kinds(study, name, {kind.kind, column.dtype.kind})
+    return Kind(np.dtype(np.float64), kind.shape, kind.case)
+
+
 def _column(study: str, name: str, rows: Sequence[Row]) -> NDArray[Any]:
     values = [row[name] for row in rows]
-    _check_shapes(study, name, {np.shape(value) for value in values})
-    kinds = {_kind(value) for value in values}
-    if len(kinds) > 1 and kinds != {"i", "f"}:
-        raise InputError(f"study {study}: `{name}` must be of one kind in all cases.")
+    types = set(map(type, values))
+    if types <= _PLAIN.keys():
+        _check_kinds(study, name, {_PLAIN[each] for each in types})
+    else:
+        _check_shapes(study, name, {np.shape(value) for value in values})
+        _check_kinds(study, name, {np.asarray(value).dtype.kind for value in values})
     return np.array(values)
 
 
@@ -100,5 +152,6 @@ def _check_shapes(study: str, name: str, shapes: set[tuple[int, ...]]) -> None:
         raise InputError(f"study {study}: `{name}` must have one shape in all cases, got {sorted(shapes)}.")
 
 
-def _kind(value: Any) -> str:
-    return np.asarray(value).dtype.kind
+def _check_kinds(study: str, name: str, kinds: set[str]) -> None:
+    if len(kinds) > 1 and kinds != {"i", "f"}:
+        raise InputError(f"study {study}: `{name}` must be of one kind in all cases.")

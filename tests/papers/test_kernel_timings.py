@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from optsat.campaign.catalogue import load_study
+from optsat.campaign.designs import Layout
 from optsat.campaign.interleaved import InterleavedTimes
 
 STUDIES = [f"kernels-{name}-timing" for name in ("certified", "filter", "rigid-body", "wahba")]
@@ -25,7 +26,7 @@ def test_every_alternative_runs_and_agrees(name: str, monkeypatch: pytest.Monkey
     monkeypatch.setattr(f"{module}.time_interleaved", _once)
     if name != "kernels-certified-timing":
         monkeypatch.setattr(f"{module}.measured_peak", lambda: 1e10)
-    (case,) = study.cases(1)
+    (case,) = Layout.of(study.name, study.cases, 1, 0).cases(range(1))
     row: dict[str, Any] = {"case": 0, **study.run(case, np.random.default_rng(0))}
     figures = study.metrics([row])
     assert all(np.isfinite(value) for value in figures.values())

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import slow_study
 
-from optsat.campaign import runner
+from optsat.campaign import case_runs, runner
 from optsat.campaign.dask_executor import Dask
 from optsat.campaign.runner import run_study
 from optsat.errors import InputError, OptsatError
@@ -118,7 +118,7 @@ def test_another_arithmetic_is_refused_unless_allowed(
     cluster: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(runner, "numerics_print", lambda: "another")
+        patch.setattr(case_runs, "numerics_print", lambda: "another")
 
         def stop(done: int, _total: int) -> None:
             if done >= 14:

@@ -18,6 +18,7 @@ import toy_study
 from optsat import files
 from optsat.campaign import run_folder, runner
 from optsat.campaign.chunk_file import ChunkError, read_chunk, write_chunk
+from optsat.campaign.designs import Layout
 from optsat.campaign.manifest import Manifest
 from optsat.campaign.runner import run_study
 from optsat.errors import InputError
@@ -230,7 +231,7 @@ def test_the_clock_of_the_first_case_sets_the_chunk_size(monkeypatch: pytest.Mon
     def size(second: float, cases: int, workers: int = 1) -> int:
         ticks: Iterator[float] = iter([0.0, second, 0.0, second])
         monkeypatch.setattr(time, "perf_counter", lambda: next(ticks))
-        return runner._chunk_size(toy_study.study, toy_study.study.cases(cases), 0, workers)
+        return runner._chunk_size(toy_study.study, Layout.of("toy-study", toy_study.study.cases, cases, 0), workers)
 
     assert size(0.1, 1000) == 20
     assert size(10.0, 1000) == 1

@@ -9,6 +9,7 @@ import pytest
 import toy_study
 
 from optsat import _version
+from optsat.campaign.rows import read_cases
 from optsat.campaign.runner import run_study
 from optsat.errors import MissingExtraError, OptsatError
 from optsat.files import write_atomically
@@ -51,7 +52,7 @@ def test_a_complete_run_is_read_and_not_run_again(tmp_path: Path, monkeypatch: p
     def refuse(*_arguments: object) -> NoReturn:
         raise AssertionError("a case was run")
 
-    monkeypatch.setattr("optsat.campaign.runner._run_cases", refuse)
+    monkeypatch.setattr("optsat.campaign.runner.run_cases", refuse)
     again = run_study(toy_study.study, cases=5, out=tmp_path)
     assert (again.rows, again.claims, again.failures) == (first.rows, first.claims, first.failures)
 
@@ -77,7 +78,7 @@ def test_without_the_extra_the_table_is_still_written(tmp_path: Path, monkeypatc
     assert sorted(path.name for path in tmp_path.iterdir()) == [name for name in FILES if name != "result.nc"]
     monkeypatch.setitem(__import__("sys").modules, "h5netcdf", None)
     with pytest.raises(MissingExtraError, match=r"optsat\[results\]"):
-        final_file.write_final_file(tmp_path / "x.nc", lambda: iter(()), 1, {})
+        final_file.write_final_file(tmp_path / "x.nc", read_cases("toy-study", [].__getitem__, 0), 1, {})
 
 
 def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

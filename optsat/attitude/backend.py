@@ -71,6 +71,11 @@ def scale(factor: Value, vector: Value) -> Value:
     return stack(factor * part for part in components(vector))
 
 
+def reciprocal(x: Value) -> Value:
+    """Return 1 / x, which CasADi would turn into one division for each product with it."""
+    return 0.5 / (0.5 * x) if is_symbolic(x) else 1 / x
+
+
 def where(condition: Value, yes: Value, no: Value) -> Value:
     """Return `yes` where the condition holds, else `no`, for scalars; both are evaluated, so both must stay finite."""
     return _casadi().if_else(condition, yes, no) if is_symbolic(condition, yes, no) else np.where(condition, yes, no)

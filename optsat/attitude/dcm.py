@@ -1,6 +1,6 @@
 """Direction cosine matrices: dcm_BN = A(q_BN) maps N components to B components."""
 
-from optsat.attitude.backend import Value, components, entries, matrix, norm, scale, stack, where
+from optsat.attitude.backend import Value, components, entries, matrix, norm, reciprocal, scale, stack, where
 from optsat.attitude.edges import QUATERNION, ROTATION_MATRIX, checked, unchecked
 from optsat.attitude.quaternion import canonical
 
@@ -39,4 +39,4 @@ def to_quaternion(dcm_BN: Value) -> Value:
         largest = where(larger, size, largest)
         column = tuple(where(larger, new, old) for new, old in zip(candidate, column, strict=True))
     q = stack(column)
-    return unchecked(canonical)(scale(1 / norm(q), q))
+    return unchecked(canonical)(scale(reciprocal(norm(q)), q))

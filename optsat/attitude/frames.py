@@ -2,7 +2,20 @@
 
 import numpy as np
 
-from optsat.attitude.backend import Value, components, cos, cross, dot, is_symbolic, matrix, norm, scale, sin, stack
+from optsat.attitude.backend import (
+    Value,
+    components,
+    cos,
+    cross,
+    dot,
+    is_symbolic,
+    matrix,
+    norm,
+    reciprocal,
+    scale,
+    sin,
+    stack,
+)
 from optsat.attitude.edges import ANGLE, POSITION, VELOCITY, checked
 from optsat.errors import InputError
 
@@ -42,8 +55,8 @@ def orbital_dcm(r_N: Value, v_N: Value) -> Value:
     InputError : position and velocity are parallel, so there is no orbit plane.
     """
     normal = _orbit_normal(r_N, v_N)
-    z = scale(-1 / norm(r_N), r_N)
-    y = scale(-1 / norm(normal), normal)
+    z = scale(-reciprocal(norm(r_N)), r_N)
+    y = scale(-reciprocal(norm(normal)), normal)
     return matrix((components(cross(y, z)), components(y), components(z)))
 
 

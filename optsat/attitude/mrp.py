@@ -1,6 +1,6 @@
 """Modified Rodrigues parameters: sigma_BN = e tan(a / 4) = v / (1 + s); results lie in the unit ball."""
 
-from optsat.attitude.backend import Value, components, cross, dot, scale, stack, where
+from optsat.attitude.backend import Value, components, cross, dot, reciprocal, scale, stack, where
 from optsat.attitude.edges import NON_ZERO, QUATERNION, RATE, VECTOR, checked, unchecked
 from optsat.attitude.quaternion import canonical as canonical_quaternion
 from optsat.attitude.quaternion import compose as compose_quaternions
@@ -10,7 +10,7 @@ from optsat.attitude.quaternion import compose as compose_quaternions
 def from_quaternion(q_BN: Value) -> Value:
     """Return sigma_BN (..., 3), |sigma| <= 1."""
     x, y, z, w = components(unchecked(canonical_quaternion)(q_BN))
-    return scale(1 / (1 + w), stack((x, y, z)))
+    return scale(reciprocal(1 + w), stack((x, y, z)))
 
 
 @checked(sigma_BN=VECTOR)
@@ -18,7 +18,7 @@ def to_quaternion(sigma_BN: Value) -> Value:
     """Return q_BN (..., 4), canonical sign; a set and its shadow give the same."""
     s1, s2, s3 = components(sigma_BN)
     square = dot(sigma_BN, sigma_BN)
-    q = scale(1 / (1 + square), stack((2 * s1, 2 * s2, 2 * s3, 1 - square)))
+    q = scale(reciprocal(1 + square), stack((2 * s1, 2 * s2, 2 * s3, 1 - square)))
     return unchecked(canonical_quaternion)(q)
 
 

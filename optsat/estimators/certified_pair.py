@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 from optsat.attitude import dcm, quaternion
-from optsat.attitude.backend import Value, atan2, cross, dot, scale, sqrt, stack
+from optsat.attitude.backend import Value, atan2, cross, dot, reciprocal, scale, sqrt, stack
 from optsat.attitude.edges import unchecked
 from optsat.port import Port
 from optsat.symbolic.attitude_functions import QUATERNION, unit_quaternion
@@ -76,13 +76,13 @@ def certified_two_vector(tiny: float = 1e-300, rounding: float = 2.0**-52) -> Ge
         tiny=tiny,
     )
     t = search.best(half_sine[0] / half_sine[1], rounding)
-    steepness = (1 / ca.fmax(b.sine, tiny), 1 / ca.fmax(r.sine, tiny))
+    steepness = (reciprocal(ca.fmax(b.sine, tiny)), reciprocal(ca.fmax(r.sine, tiny)))
     outward = 1 + _MARGIN_OF_SQUARE * rounding * (steepness[0] + steepness[1])
     square = ca.fmax(search.value(t), 0) * (0.25 * steepness[0] * outward) * steepness[1]
     collinear = ca.fmin(b.sine, r.sine) <= _COLLINEAR * rounding
     free = ca.logic_or(collinear, ca.logic_not(square < 1))
     angle = 2 * atan2(sqrt(ca.fmin(square, 1)), sqrt(1 - ca.fmin(square, 1)))
-    share = 1 / search.P(t)
+    share = reciprocal(search.P(t))
     closed = _quaternion_from_dcm(_rotation(b, r, (1 + t * cos_difference) * share, t * sin_difference * share))
     better_B, better_N = (ca.if_else(bound[0] <= bound[1], pair.first, pair.second) for pair in (b, r))
     q = ca.if_else(collinear, _smallest_rotation(better_B, better_N, tiny, rounding), closed)
@@ -99,7 +99,7 @@ def certified_two_vector(tiny: float = 1e-300, rounding: float = 2.0**-52) -> Ge
                 Port("bound_rad", (), "rad", lower=0.0, upper=3.2, safe=math.pi),
                 ca.if_else(ca.logic_or(free, inconsistent), math.pi, angle),
             ),
-            (Port("weights", (2,), "-", lower=0.0, upper=1.0, safe=0.5), stack((1 / (1 + t), t / (1 + t)))),
+            (Port("weights", (2,), "-", lower=0.0, upper=1.0, safe=0.5), scale(reciprocal(1 + t), stack((1, t)))),
             (Port("status", (), "-", lower=0.0, upper=2.0, safe=1.0), ca.if_else(inconsistent, 2, free)),
         ],
     )
@@ -120,12 +120,12 @@ def _pair_of(rows: Value, tiny: float) -> _Pair:
     import casadi as ca
 
     def unit(vector: Value) -> Value:
-        return scale(1 / ca.fmax(sqrt(dot(vector, vector)), tiny), vector)
+        return scale(reciprocal(ca.fmax(sqrt(dot(vector, vector)), tiny)), vector)
 
     first, second = unit(rows[0, :].T), unit(rows[1, :].T)
     normal = cross(first, second)
     sine = sqrt(dot(normal, normal))
-    return _Pair(first, second, scale(1 / ca.fmax(sine, tiny), normal), dot(first, second), sine)
+    return _Pair(first, second, scale(reciprocal(ca.fmax(sine, tiny)), normal), dot(first, second), sine)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from functools import reduce
 
-from optsat.attitude.backend import Value
+from optsat.attitude.backend import Value, reciprocal
 from optsat.estimators.filter_model import FilterModel, Noise, noise_matrix, noise_port, symmetric
 from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
@@ -96,7 +96,7 @@ def cholesky(M: Value, rounding: float) -> Factor:
         positives.append(positive)
         pivots.append(ca.if_else(positive, pivot, 1))
         L[j, j] = ca.sqrt(pivots[j])
-        inverses.append(1 / L[j, j])
+        inverses.append(reciprocal(L[j, j]))
         for i in range(j + 1, n):
             rest = M[i, j] - ca.dot(L[i, :j], L[j, :j]) if j else M[i, j]
             L[i, j] = rest * inverses[j]

@@ -10,7 +10,7 @@ a step of inverse iteration, restores what an eigenvalue routine would give.
 import math
 
 from optsat.attitude import quaternion
-from optsat.attitude.backend import Value, dot, entries, matrix, sqrt
+from optsat.attitude.backend import Value, dot, entries, matrix, reciprocal, sqrt
 from optsat.attitude.edges import unchecked
 from optsat.errors import InputError
 from optsat.port import Port
@@ -94,7 +94,7 @@ def best_attitude(B: Value, tiny: float, rounding: float) -> tuple[Value, Value,
     least = math.sqrt(tiny)
     length = sqrt(ca.sumsqr(ca.vec(B)))
     size = ca.fmax(length, least)
-    unit_B = B / size
+    unit_B = reciprocal(size) * B
     root, gap, last_step = _largest_root(unit_B, rounding)
     adjugate = _adjugate((root + _RAISED * rounding) * ca.SX.eye(4) - _davenport(unit_B))
     first = _longest_column(adjugate)

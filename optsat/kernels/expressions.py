@@ -20,6 +20,7 @@ class Language:
     constant, load : spelling of a constant, of an input
     words : what else the templates name in braces
     pair : what gives sine and cosine of {a} together, which the templates call {pair}; "" where there is no such thing
+    suffix : end of the names of variables
     """
 
     operations: Mapping[str, str]
@@ -29,6 +30,11 @@ class Language:
     load: Callable[[Input], str]
     words: Mapping[str, str]
     pair: str = ""
+    suffix: str = ""
+
+    def variable(self, index: int) -> str:
+        """Return the name of what a node gives."""
+        return f"t{index}{self.suffix}"
 
     def write(self, template: str, **operands: str) -> str:
         """Return the template with the operands and the words in place."""
@@ -49,19 +55,19 @@ def assignments(program: Program, language: Language) -> Iterator[Assignment]:
     paired: set[int] = set()
     for index, node in enumerate(program.nodes):
         if isinstance(node, Input):
-            yield Assignment(f"t{index}", "number", language.load(node))
+            yield Assignment(language.variable(index), "number", language.load(node))
         elif isinstance(node, Operation):
             numbers = [as_number(program, i, language) for i in node.operands]
             truths = [_as_truth(program, i, language) for i in node.operands]
             named = dict(zip("ab", numbers, strict=False)) | dict(zip("pq", truths, strict=False))
             if language.pair and node.code in CIRCULAR:
                 operand = node.operands[0]
-                named["pair"] = f"p{operand}"
+                named["pair"] = f"p{operand}{language.suffix}"
                 if operand not in paired:
                     paired.add(operand)
                     yield Assignment(named["pair"], "pair", language.write(language.pair, **named))
             kind: Literal["number", "truth"] = "truth" if node.code in TRUTH else "number"
-            yield Assignment(f"t{index}", kind, language.write(language.operations[node.code], **named))
+            yield Assignment(language.variable(index), kind, language.write(language.operations[node.code], **named))
 
 
 def as_number(program: Program, index: int, language: Language) -> str:
@@ -69,12 +75,13 @@ def as_number(program: Program, index: int, language: Language) -> str:
     node = program.nodes[index]
     if isinstance(node, Constant):
         return language.constant(node.value)
-    return language.write(language.number, p=f"t{index}") if _is_truth(program, index) else f"t{index}"
+    name = language.variable(index)
+    return language.write(language.number, p=name) if _is_truth(program, index) else name
 
 
 def _as_truth(program: Program, index: int, language: Language) -> str:
     if _is_truth(program, index):
-        return f"t{index}"
+        return language.variable(index)
     return language.write(language.truth, a=as_number(program, index, language))
 
 

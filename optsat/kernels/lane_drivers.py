@@ -1,4 +1,4 @@
-"""Lane drivers: batches in tiles of OS_WIDTH samples, gathered from arrays of samples or resident in memory."""
+"""Lane drivers: batches in tiles of OS_TILE samples, gathered from arrays of samples or resident in memory."""
 
 from optsat.kernels.drivers import array_lengths, copies
 from optsat.kernels.source import KernelSource
@@ -15,8 +15,8 @@ _CALL = """\
 int32_t {name}_call(const os_real_t *const in[], os_real_t *const out[]);
 int32_t {name}_call(const os_real_t *const in[], os_real_t *const out[])
 {{
-    os_lanes_real_t x[{k_in}];
-    os_lanes_real_t y[{k_out}];
+    os_lanes_real_t x[{k_in} * OS_SIDES];
+    os_lanes_real_t y[{k_out} * OS_SIDES];
 {load}
     {name}_tile(x, y);
 {store}
@@ -25,40 +25,20 @@ int32_t {name}_call(const os_real_t *const in[], os_real_t *const out[])
 """
 
 _DRIVERS = """\
-OS_LANE os_lanes_real_t {name}_gathered(const os_real_t *in, int64_t first, int64_t last, int64_t stride)
-{{
-    os_lanes_real_t r;
-    OS_UNROLLED
-    for (int32_t w = 0; w < OS_WIDTH; ++w) {{
-        r[w] = in[(((first + w) < last) ? (first + w) : last) * stride];
-    }}
-    return r;
-}}
-
-OS_LANE os_lanes_real_t {name}_gathered_whole(const os_real_t *in, int64_t first, int64_t stride)
-{{
-    os_lanes_real_t r;
-    OS_UNROLLED
-    for (int32_t w = 0; w < OS_WIDTH; ++w) {{
-        r[w] = in[(first + w) * stride];
-    }}
-    return r;
-}}
-
 int64_t {name}_batch(int64_t n, const os_real_t *const in[], const int64_t stride[], os_real_t *const out[],
     int32_t *status);
 int64_t {name}_batch(int64_t n, const os_real_t *const in[], const int64_t stride[], os_real_t *const out[],
     int32_t *status)
 {{
-    os_lanes_real_t x[{k_in}];
-    os_lanes_real_t y[{k_out}];
+    os_lanes_real_t x[{k_in} * OS_SIDES];
+    os_lanes_real_t y[{k_out} * OS_SIDES];
     int64_t i = 0;
-    for (; i <= (n - OS_WIDTH); i += OS_WIDTH) {{
+    for (; i <= (n - OS_TILE); i += OS_TILE) {{
 {load_whole}
         {name}_tile(x, y);
         OS_UNROLLED
         for (int32_t w = 0; w < OS_WIDTH; ++w) {{
-{store}
+{store_whole}
         }}
     }}
     if (i < n) {{
@@ -66,7 +46,7 @@ int64_t {name}_batch(int64_t n, const os_real_t *const in[], const int64_t strid
 {load_rest}
         {name}_tile(x, y);
         for (int32_t w = 0; w < (int32_t)(n - i); ++w) {{
-{store}
+{store_rest}
         }}
     }}
     for (int64_t s = 0; (status != NULL) && (s < n); ++s) {{
@@ -79,8 +59,8 @@ void {name}_tiles(int64_t tiles, const os_real_t *const in[], const int64_t stri
 void {name}_tiles(int64_t tiles, const os_real_t *const in[], const int64_t stride[], os_real_t *const out[])
 {{
     for (int64_t t = 0; t < tiles; ++t) {{
-        os_lanes_real_t x[{k_in}];
-        os_lanes_real_t y[{k_out}];
+        os_lanes_real_t x[{k_in} * OS_SIDES];
+        os_lanes_real_t y[{k_out} * OS_SIDES];
 {load_tile}
         {name}_tile(x, y);
 {store_tile}
@@ -99,22 +79,31 @@ def print_call_of_tile(source: KernelSource) -> str:
     return _CALL.format(
         name=source.name,
         **array_lengths(source),
-        load=copies(source.inputs, "x[{at}] = os_lanes_constant(in[{p}][k]);", 1),
-        store=copies(source.outputs, "out[{p}][k] = y[{at}][0];", 1),
+        load=copies(source.inputs, _on_each_side("{vector} = os_lanes_constant(in[{p}][k]);", "x"), 1),
+        store=copies(source.outputs, "out[{p}][k] = y[({at}) * OS_SIDES][0];", 1),
     )
 
 
 def print_lane_drivers(source: KernelSource) -> str:
-    """Return NAME_batch over arrays (n, k), and NAME_tiles over arrays (tiles, k, OS_WIDTH), of the lanes of a leaf."""
-    name = source.name
-    stored = "*((os_lanes_stored_t *)(out[{p}] + ((t * {size}) + k) * OS_WIDTH)) = y[{at}];"
-    loaded = "x[{at}] = *((const os_lanes_stored_t *)(in[{p}] + (t * stride[{p}]) + (k * OS_WIDTH)));"
+    """Return NAME_batch over arrays (n, k), and NAME_tiles over arrays (tiles, k, OS_TILE), of the lanes of a leaf."""
+    stored = "*((os_lanes_stored_t *)(out[{p}] + ((t * {size}) + k) * OS_TILE + s * OS_WIDTH)) = {vector};"
+    loaded = "{vector} = *((const os_lanes_stored_t *)(in[{p}] + (t * stride[{p}]) + (k * OS_TILE) + s * OS_WIDTH));"
+    whole = "{vector} = os_lanes_gathered_whole(in[{p}] + k, i + s * OS_WIDTH, stride[{p}]);"
+    rest = "{vector} = os_lanes_gathered(in[{p}] + k, i + s * OS_WIDTH, n - 1, stride[{p}]);"
+    last = "out[{p}][((i + w) * {size}) + k] = y[({at}) * OS_SIDES + (w / OS_WIDTH)][w % OS_WIDTH];"
+    spread = "out[{p}][((i + (s * OS_WIDTH) + w) * {size}) + k] = {vector}[w];"
     return _DRIVERS.format(
-        name=name,
+        name=source.name,
         **array_lengths(source),
-        load_whole=copies(source.inputs, f"x[{{at}}] = {name}_gathered_whole(in[{{p}}] + k, i, stride[{{p}}]);", 2),
-        load_rest=copies(source.inputs, f"x[{{at}}] = {name}_gathered(in[{{p}}] + k, i, n - 1, stride[{{p}}]);", 2),
-        store=copies(source.outputs, "out[{p}][((i + w) * {size}) + k] = y[{at}][w];", 3),
-        load_tile=copies(source.inputs, loaded, 2),
-        store_tile=copies(source.outputs, stored, 2),
+        load_whole=copies(source.inputs, _on_each_side(whole, "x"), 2),
+        load_rest=copies(source.inputs, _on_each_side(rest, "x"), 2),
+        store_whole=copies(source.outputs, _on_each_side(spread, "y"), 3),
+        store_rest=copies(source.outputs, last, 3),
+        load_tile=copies(source.inputs, _on_each_side(loaded, "x"), 2),
+        store_tile=copies(source.outputs, _on_each_side(stored, "y"), 2),
     )
+
+
+def _on_each_side(statement: str, array: str) -> str:
+    placed = statement.replace("{vector}", array + "[({at}) * OS_SIDES + s]")
+    return "for (int32_t s = 0; s < OS_SIDES; ++s) {{ " + placed + " }}"

@@ -44,32 +44,30 @@ _OWN = {code: re.sub(r"\bos_", "os_lanes_", template) for code, template in OWN.
 _TYPES = {"number": "os_lanes_real_t", "truth": "os_lanes_bool_t", "pair": "os_lanes_sine_cosine_t"}
 
 
-def print_lanes(program: Program, dense: bool = False, math: Math = "own") -> str:
+def print_lanes(program: Program, dense: bool = False, math: Math = "own", sides: int = 1) -> str:
     """Return `NAME_lanes(const os_lanes_real_t *x, os_lanes_real_t *y)`: each number of the scalar leaf is a vector.
 
     program, dense, math : as in `print_scalar`
+    sides : vectors that each number is, side by side in x and in y; their computations do not wait for each other, so
+        the processor works on the next where it would wait for a division or a root of the first
     The text is the same for every width. All of x is read before any of y is written.
     """
-    offsets = [pattern.offsets(dense) for pattern in program.inputs]
-    start = starts(program.inputs, dense)
-    language = Language(
-        operations=OPERATIONS | _OWN if math == "own" else OPERATIONS,
-        number="os_lanes_or_zero({p}, {one})",
-        truth="os_lanes_truth({a})",
-        constant=_constant,
-        load=lambda node: f"x[{start[node.argument] + offsets[node.argument][node.element]}]",
-        words={"one": _constant(1.0), "zero": _constant(0.0)},
-        pair="os_lanes_sine_cosine({a})" if math == "own" else "",
-    )
+    languages = [_language(program, dense, math, side, sides) for side in range(sides)]
     lines = [
-        f"    const {_TYPES[each.kind]} {each.variable} = {each.expression};" for each in assignments(program, language)
+        f"    const {_TYPES[each.kind]} {each.variable} = {each.expression};"
+        for together in zip(*(assignments(program, language) for language in languages), strict=True)
+        for each in together
     ]
     if not any(isinstance(node, Input) for node in program.nodes):
         lines.append("    (void)x;")
-    stores = stores_of(program, language, dense)
+    stores = [
+        line
+        for side, language in enumerate(languages)
+        for line in stores_of(program, language, dense, _place("{k}", side, sides))
+    ]
     return "\n".join(
         [
-            f"/* x: {listed(program.inputs, dense)}; y: {listed(program.outputs, dense)} */",
+            f"/* x: {listed(program.inputs, dense)}; y: {listed(program.outputs, dense)}; vectors for each: {sides} */",
             f"OS_LANE void {program.name}_lanes(const os_lanes_real_t *x, os_lanes_real_t *y)",
             "{",
             *lines,
@@ -77,6 +75,29 @@ def print_lanes(program: Program, dense: bool = False, math: Math = "own") -> st
             "}",
             "",
         ]
+    )
+
+
+def _place(k: object, side: int, sides: int) -> str:
+    return str(k) if sides == 1 else f"{k} * {sides} + {side}"
+
+
+def _language(program: Program, dense: bool, math: Math, side: int, sides: int) -> Language:
+    offsets = [pattern.offsets(dense) for pattern in program.inputs]
+    start = starts(program.inputs, dense)
+
+    def load(node: Input) -> str:
+        return f"x[{_place(start[node.argument] + offsets[node.argument][node.element], side, sides)}]"
+
+    return Language(
+        operations=OPERATIONS | _OWN if math == "own" else OPERATIONS,
+        number="os_lanes_or_zero({p}, {one})",
+        truth="os_lanes_truth({a})",
+        constant=_constant,
+        load=load,
+        words={"one": _constant(1.0), "zero": _constant(0.0)},
+        pair="os_lanes_sine_cosine({a})" if math == "own" else "",
+        suffix="" if sides == 1 else f"_{side}",
     )
 
 

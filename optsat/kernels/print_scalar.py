@@ -99,15 +99,19 @@ def c_constant(value: float) -> str:
     return f"((os_real_t){digits}p{exponent})"
 
 
-def stores_of(program: Program, language: Language, dense: bool) -> list[str]:
-    """Return the statements that store the results."""
+def stores_of(program: Program, language: Language, dense: bool, place: str = "{k}") -> list[str]:
+    """Return the statements that store the results.
+
+    place : template of where in y the number {k} of all results stands
+    """
     stores = []
     for pattern, result, start in zip(program.outputs, program.results, starts(program.outputs, dense), strict=False):
         written = {
             offset: as_number(program, i, language) for offset, i in zip(pattern.offsets(dense), result, strict=True)
         }
         stores += [
-            f"    y[{start + k}] = {written.get(k, language.words['zero'])};" for k in range(pattern.length(dense))
+            f"    y[{place.format(k=start + k)}] = {written.get(k, language.words['zero'])};"
+            for k in range(pattern.length(dense))
         ]
     return stores
 

@@ -22,6 +22,7 @@ class KernelSource:
         `static os_status_t NAME_body(const os_real_t *x, os_real_t *y, NAME_work_t *work)` and its struct NAME_work_t;
         all of x is read before any of y is written
     lanes : text of the same leaf over vectors of several samples, or "" where there is none
+    sides : vectors that each number of it is
     libm : the C functions used whose last bits depend on the machine
     operations : arithmetic operations of one sample, or of one iteration where they are not fixed
     twin : the same in plain Python, where no C compiler is; None for a leaf, which CasADi runs
@@ -35,6 +36,7 @@ class KernelSource:
     body: str
     has_status: bool = False
     lanes: str = ""
+    sides: int = 1
     libm: tuple[str, ...] = ()
     operations: int = 0
     twin: Twin | None = None

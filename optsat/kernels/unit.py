@@ -29,11 +29,11 @@ def library_text(source: KernelSource, real: Real = "double", width: int = 1) ->
     `int32_t NAME_call(in, out)`: one sample, a pointer for each port, matrices counted by rows; returns its status
     `int64_t NAME_batch(n, in, stride, out, status)`: n samples one after another; stride: numbers from one sample of
         an argument to the next, 0 where all share it; status: (n,) or NULL; returns how many are not OS_OK
-    `void NAME_tiles(tiles, in, stride, out)`: only for leaves of a width above 1: samples in tiles (k, width), k the
+    `void NAME_tiles(tiles, in, stride, out)`: only for leaves of a width above 1: samples in tiles (k, os_width), k the
         size of the port; stride: numbers from one tile of an argument to the next, 0 where all share it
     Results must not overlap anything but, in a call, the arguments. What has a status has width 1, whatever is asked.
 
-    width : samples at once, 1, 2, 4, 8 or 16; the bits are the same at each, and wider than the machine is slower
+    width : samples in a vector, 1, 2, 4, 8 or 16; the bits are the same at each, and wider than the machine is slower
 
     Raises
     ------
@@ -50,11 +50,12 @@ def library_text(source: KernelSource, real: Real = "double", width: int = 1) ->
         [
             *(["#define OS_REAL_IS_FLOAT"] if real == "float" else []),
             *([f"#define OS_WIDTH {width}"] if in_lanes else []),
+            *([f"#define OS_SIDES {source.sides}\n#define OS_TILE (OS_WIDTH * OS_SIDES)"] if in_lanes else []),
             headers_text(["os_rt.h", *(["os_lanes.h"] if in_lanes else []), *names]),
             *([] if lanes_alone else [without_includes(source.body)]),
             *([*(lanes_of(header(name)) for name in names), source.lanes, print_tile(source)] if in_lanes else []),
             "extern const uint32_t os_abi;\nextern const uint32_t os_width;",
-            f"const uint32_t os_abi = {ABI}U;\nconst uint32_t os_width = {width if in_lanes else 1}U;\n",
+            f"const uint32_t os_abi = {ABI}U;\nconst uint32_t os_width = {width * source.sides if in_lanes else 1}U;\n",
             print_call_of_tile(source) if lanes_alone else print_call(source),
             print_lane_drivers(source) if in_lanes else print_batch(source),
         ]

@@ -5,7 +5,7 @@ length zero, which flight code refuses, becomes the identity. Results keep the s
 """
 
 from optsat.attitude import dcm, euler321, mrp, quaternion, rotation_vector
-from optsat.attitude.backend import Value, components, dot, scale, sqrt, stack
+from optsat.attitude.backend import Value, components, dot, reciprocal, scale, sqrt, stack
 from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
 
@@ -29,7 +29,7 @@ def unit_quaternion(q: Value, tiny: float = TINY) -> Value:
     import casadi as ca
 
     length = sqrt(dot(q, q))
-    x, y, z, w = components(scale(1 / ca.fmax(length, tiny), q))
+    x, y, z, w = components(scale(reciprocal(ca.fmax(length, tiny)), q))
     return stack((x, y, z, w + (length <= tiny)))
 
 

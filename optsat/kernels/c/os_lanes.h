@@ -140,6 +140,28 @@ OS_LANE os_lanes_real_t os_lanes_fmin(os_lanes_real_t a, os_lanes_real_t b)
     return os_lanes_select(os_lanes_is_nan(b) | (os_lanes_bool_t)(a <= b), a, b);
 }
 
+/* One number of OS_WIDTH samples from the first on, `stride` apart; past the last one, that of the last. */
+OS_LANE os_lanes_real_t os_lanes_gathered(const os_real_t *in, int64_t first, int64_t last, int64_t stride)
+{
+    os_lanes_real_t r;
+    OS_UNROLLED
+    for (int32_t w = 0; w < OS_WIDTH; ++w) {
+        r[w] = in[(((first + w) < last) ? (first + w) : last) * stride];
+    }
+    return r;
+}
+
+/* The same where all samples are there. */
+OS_LANE os_lanes_real_t os_lanes_gathered_whole(const os_real_t *in, int64_t first, int64_t stride)
+{
+    os_lanes_real_t r;
+    OS_UNROLLED
+    for (int32_t w = 0; w < OS_WIDTH; ++w) {
+        r[w] = in[(first + w) * stride];
+    }
+    return r;
+}
+
 /* A function of one sample for each in turn; compilers make single instructions of the exact ones. */
 #define OS_EACH_OF_ONE(name, function)                                              \
     OS_LANE os_lanes_real_t os_lanes_##name(os_lanes_real_t a)                      \

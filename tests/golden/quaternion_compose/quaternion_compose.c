@@ -4,10 +4,10 @@
  * model         SHA-256 ...
  * parameters    SHA-256 c69962b8d8620d830f66079e823e334d35f1f7af93cc172dfaf60e98798c6cd9
  *     tiny = 1e-30
- * body          SHA-256 d7844f5cf71d0e92c20bff3ac9bb50fe02cada0c81ddd5191254c97b418180ed
+ * body          SHA-256 da33dba0cc3ece71c1c1b14e2cf9aef3d9ae75eb03978cf7dd0a0caf2d272c3f
  * made with     optsat 0.1.0, emitter 1, CasADi ...
  * real type     float
- * operations    82: ADD 17, DIV 8, FMAX 2, IF_ELSE_ZERO 8, LE 2, LT 1, MUL 20, NE 3, NOT 4, SQ 8, SQRT 2, SUB 7
+ * operations    86: ADD 17, DIV 2, FMAX 2, IF_ELSE_ZERO 8, LE 2, LT 1, MUL 30, NE 3, NOT 4, SQ 8, SQRT 2, SUB 7
  * libm          none, so the bits are the same on every IEEE machine
  * stack         not measured: no compiler for cortex-m4 that states it
  * float error   not measured: the self-test was not run
@@ -28,7 +28,6 @@
 /* x: q_CB (4), q_BN (4); y: q_CN (4) */
 static inline void quaternion_compose_leaf(const os_real_t *x, os_real_t *y)
 {
-    const os_real_t t0 = x[3];
     const os_real_t t1 = x[0];
     const os_real_t t2 = t1 * t1;
     const os_real_t t3 = x[1];
@@ -37,91 +36,96 @@ static inline void quaternion_compose_leaf(const os_real_t *x, os_real_t *y)
     const os_real_t t6 = x[2];
     const os_real_t t7 = t6 * t6;
     const os_real_t t8 = t5 + t7;
-    const os_real_t t9 = t0 * t0;
-    const os_real_t t10 = t8 + t9;
-    const os_real_t t11 = os_sqrt(t10);
-    const os_real_t t13 = os_fmax(t11, ((os_real_t)0x1.4484bfeebc2ap-100));
-    const os_real_t t14 = t0 / t13;
-    const bool t15 = t11 <= ((os_real_t)0x1.4484bfeebc2ap-100);
-    const os_real_t t16 = t14 + (t15 ? ((os_real_t)0x1p+0) : ((os_real_t)0x0p+0));
-    const os_real_t t17 = x[7];
-    const os_real_t t18 = x[4];
-    const os_real_t t19 = t18 * t18;
-    const os_real_t t20 = x[5];
+    const os_real_t t9 = x[3];
+    const os_real_t t10 = t9 * t9;
+    const os_real_t t11 = t8 + t10;
+    const os_real_t t12 = os_sqrt(t11);
+    const os_real_t t14 = os_fmax(t12, ((os_real_t)0x1.4484bfeebc2ap-100));
+    const os_real_t t15 = ((os_real_t)0x1p-1) * t14;
+    const os_real_t t16 = ((os_real_t)0x1p-1) / t15;
+    const os_real_t t17 = t16 * t9;
+    const bool t18 = t12 <= ((os_real_t)0x1.4484bfeebc2ap-100);
+    const os_real_t t19 = t17 + (t18 ? ((os_real_t)0x1p+0) : ((os_real_t)0x0p+0));
+    const os_real_t t20 = x[4];
     const os_real_t t21 = t20 * t20;
-    const os_real_t t22 = t19 + t21;
-    const os_real_t t23 = x[6];
-    const os_real_t t24 = t23 * t23;
-    const os_real_t t25 = t22 + t24;
-    const os_real_t t26 = t17 * t17;
-    const os_real_t t27 = t25 + t26;
-    const os_real_t t28 = os_sqrt(t27);
-    const os_real_t t29 = os_fmax(t28, ((os_real_t)0x1.4484bfeebc2ap-100));
-    const os_real_t t30 = t17 / t29;
-    const bool t31 = t28 <= ((os_real_t)0x1.4484bfeebc2ap-100);
-    const os_real_t t32 = t30 + (t31 ? ((os_real_t)0x1p+0) : ((os_real_t)0x0p+0));
-    const os_real_t t33 = t16 * t32;
-    const os_real_t t34 = t1 / t13;
-    const os_real_t t35 = t18 / t29;
-    const os_real_t t36 = t34 * t35;
-    const os_real_t t37 = t3 / t13;
-    const os_real_t t38 = t20 / t29;
-    const os_real_t t39 = t37 * t38;
-    const os_real_t t40 = t36 + t39;
-    const os_real_t t41 = t6 / t13;
-    const os_real_t t42 = t23 / t29;
-    const os_real_t t43 = t41 * t42;
-    const os_real_t t44 = t40 + t43;
-    const os_real_t t45 = t33 - t44;
-    const bool t47 = !os_equal(t45, ((os_real_t)0x0p+0));
-    const os_real_t t48 = t47 ? t45 : ((os_real_t)0x0p+0);
-    const bool t49 = !t47;
-    const os_real_t t50 = t16 * t35;
-    const os_real_t t51 = t32 * t34;
-    const os_real_t t52 = t50 + t51;
-    const os_real_t t53 = t37 * t42;
-    const os_real_t t54 = t41 * t38;
-    const os_real_t t55 = t53 - t54;
-    const os_real_t t56 = t52 - t55;
-    const bool t57 = !os_equal(t56, ((os_real_t)0x0p+0));
-    const os_real_t t58 = t57 ? t56 : ((os_real_t)0x0p+0);
-    const bool t59 = !t57;
-    const os_real_t t60 = t16 * t38;
-    const os_real_t t61 = t32 * t37;
-    const os_real_t t62 = t60 + t61;
-    const os_real_t t63 = t41 * t35;
-    const os_real_t t64 = t34 * t42;
-    const os_real_t t65 = t63 - t64;
-    const os_real_t t66 = t62 - t65;
-    const bool t67 = !os_equal(t66, ((os_real_t)0x0p+0));
-    const os_real_t t68 = t67 ? t66 : ((os_real_t)0x0p+0);
-    const bool t69 = !t67;
-    const os_real_t t70 = t16 * t42;
-    const os_real_t t71 = t32 * t41;
-    const os_real_t t72 = t70 + t71;
-    const os_real_t t73 = t34 * t38;
-    const os_real_t t74 = t37 * t35;
-    const os_real_t t75 = t73 - t74;
-    const os_real_t t76 = t72 - t75;
-    const os_real_t t77 = t69 ? t76 : ((os_real_t)0x0p+0);
-    const os_real_t t78 = t68 + t77;
-    const os_real_t t79 = t59 ? t78 : ((os_real_t)0x0p+0);
-    const os_real_t t80 = t58 + t79;
-    const os_real_t t81 = t49 ? t80 : ((os_real_t)0x0p+0);
-    const os_real_t t82 = t48 + t81;
-    const bool t83 = t82 < ((os_real_t)0x0p+0);
-    const os_real_t t85 = t83 ? ((os_real_t)-0x1p+0) : ((os_real_t)0x0p+0);
-    const bool t86 = !t83;
-    const os_real_t t88 = t86 ? ((os_real_t)0x1p+0) : ((os_real_t)0x0p+0);
-    const os_real_t t89 = t85 + t88;
-    const os_real_t t90 = t89 * t56;
-    const os_real_t t91 = t89 * t66;
-    const os_real_t t92 = t89 * t76;
-    const os_real_t t93 = t89 * t45;
-    y[0] = t90;
-    y[1] = t91;
-    y[2] = t92;
-    y[3] = t93;
+    const os_real_t t22 = x[5];
+    const os_real_t t23 = t22 * t22;
+    const os_real_t t24 = t21 + t23;
+    const os_real_t t25 = x[6];
+    const os_real_t t26 = t25 * t25;
+    const os_real_t t27 = t24 + t26;
+    const os_real_t t28 = x[7];
+    const os_real_t t29 = t28 * t28;
+    const os_real_t t30 = t27 + t29;
+    const os_real_t t31 = os_sqrt(t30);
+    const os_real_t t32 = os_fmax(t31, ((os_real_t)0x1.4484bfeebc2ap-100));
+    const os_real_t t33 = ((os_real_t)0x1p-1) * t32;
+    const os_real_t t34 = ((os_real_t)0x1p-1) / t33;
+    const os_real_t t35 = t34 * t28;
+    const bool t36 = t31 <= ((os_real_t)0x1.4484bfeebc2ap-100);
+    const os_real_t t37 = t35 + (t36 ? ((os_real_t)0x1p+0) : ((os_real_t)0x0p+0));
+    const os_real_t t38 = t19 * t37;
+    const os_real_t t39 = t16 * t1;
+    const os_real_t t40 = t34 * t20;
+    const os_real_t t41 = t39 * t40;
+    const os_real_t t42 = t16 * t3;
+    const os_real_t t43 = t34 * t22;
+    const os_real_t t44 = t42 * t43;
+    const os_real_t t45 = t41 + t44;
+    const os_real_t t46 = t16 * t6;
+    const os_real_t t47 = t34 * t25;
+    const os_real_t t48 = t46 * t47;
+    const os_real_t t49 = t45 + t48;
+    const os_real_t t50 = t38 - t49;
+    const bool t52 = !os_equal(t50, ((os_real_t)0x0p+0));
+    const os_real_t t53 = t52 ? t50 : ((os_real_t)0x0p+0);
+    const bool t54 = !t52;
+    const os_real_t t55 = t19 * t40;
+    const os_real_t t56 = t37 * t39;
+    const os_real_t t57 = t55 + t56;
+    const os_real_t t58 = t42 * t47;
+    const os_real_t t59 = t46 * t43;
+    const os_real_t t60 = t58 - t59;
+    const os_real_t t61 = t57 - t60;
+    const bool t62 = !os_equal(t61, ((os_real_t)0x0p+0));
+    const os_real_t t63 = t62 ? t61 : ((os_real_t)0x0p+0);
+    const bool t64 = !t62;
+    const os_real_t t65 = t19 * t43;
+    const os_real_t t66 = t37 * t42;
+    const os_real_t t67 = t65 + t66;
+    const os_real_t t68 = t46 * t40;
+    const os_real_t t69 = t39 * t47;
+    const os_real_t t70 = t68 - t69;
+    const os_real_t t71 = t67 - t70;
+    const bool t72 = !os_equal(t71, ((os_real_t)0x0p+0));
+    const os_real_t t73 = t72 ? t71 : ((os_real_t)0x0p+0);
+    const bool t74 = !t72;
+    const os_real_t t75 = t19 * t47;
+    const os_real_t t76 = t37 * t46;
+    const os_real_t t77 = t75 + t76;
+    const os_real_t t78 = t39 * t43;
+    const os_real_t t79 = t42 * t40;
+    const os_real_t t80 = t78 - t79;
+    const os_real_t t81 = t77 - t80;
+    const os_real_t t82 = t74 ? t81 : ((os_real_t)0x0p+0);
+    const os_real_t t83 = t73 + t82;
+    const os_real_t t84 = t64 ? t83 : ((os_real_t)0x0p+0);
+    const os_real_t t85 = t63 + t84;
+    const os_real_t t86 = t54 ? t85 : ((os_real_t)0x0p+0);
+    const os_real_t t87 = t53 + t86;
+    const bool t88 = t87 < ((os_real_t)0x0p+0);
+    const os_real_t t90 = t88 ? ((os_real_t)-0x1p+0) : ((os_real_t)0x0p+0);
+    const bool t91 = !t88;
+    const os_real_t t93 = t91 ? ((os_real_t)0x1p+0) : ((os_real_t)0x0p+0);
+    const os_real_t t94 = t90 + t93;
+    const os_real_t t95 = t94 * t61;
+    const os_real_t t96 = t94 * t71;
+    const os_real_t t97 = t94 * t81;
+    const os_real_t t98 = t94 * t50;
+    y[0] = t95;
+    y[1] = t96;
+    y[2] = t97;
+    y[3] = t98;
 }
 
 os_status_t quaternion_compose(const quaternion_compose_in_t *in, quaternion_compose_out_t *out)

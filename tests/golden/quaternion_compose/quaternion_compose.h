@@ -4,10 +4,10 @@
  * model         SHA-256 ...
  * parameters    SHA-256 c69962b8d8620d830f66079e823e334d35f1f7af93cc172dfaf60e98798c6cd9
  *     tiny = 1e-30
- * body          SHA-256 d7844f5cf71d0e92c20bff3ac9bb50fe02cada0c81ddd5191254c97b418180ed
+ * body          SHA-256 da33dba0cc3ece71c1c1b14e2cf9aef3d9ae75eb03978cf7dd0a0caf2d272c3f
  * made with     optsat 0.1.0, emitter 1, CasADi ...
  * real type     float
- * operations    82: ADD 17, DIV 8, FMAX 2, IF_ELSE_ZERO 8, LE 2, LT 1, MUL 20, NE 3, NOT 4, SQ 8, SQRT 2, SUB 7
+ * operations    86: ADD 17, DIV 2, FMAX 2, IF_ELSE_ZERO 8, LE 2, LT 1, MUL 30, NE 3, NOT 4, SQ 8, SQRT 2, SUB 7
  * libm          none, so the bits are the same on every IEEE machine
  * stack         not measured: no compiler for cortex-m4 that states it
  * float error   not measured: the self-test was not run

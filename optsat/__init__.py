@@ -19,8 +19,11 @@ if TYPE_CHECKING:
     from optsat.estimators.attitude_series import AttitudeSeries, Window, certify_record
     from optsat.estimators.isolation import Isolation, isolate
     from optsat.export.export import Export, export_c
+    from optsat.problems.attainment import Attainment
     from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
     from optsat.problems.component_box import ComponentBox
+    from optsat.problems.goal_attainment import GoalAttainment
+    from optsat.problems.minimax import Minimax
     from optsat.problems.wahba import Wahba, WahbaAttitude
     from optsat.records.csv_log import read_csv_log, write_csv_log
     from optsat.records.record import Record, VectorChannel
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from optsat.statistical_bound import statistical_angle_bound
 
 _HOME = {
+    "Attainment": "optsat.problems.attainment",
     "AttitudeSeries": "optsat.estimators.attitude_series",
     "AttitudeStatus": "optsat.attitude.status",
     "CertifiedAttitude": "optsat.problems.certified_attitude",
@@ -35,8 +39,10 @@ _HOME = {
     "CertifiedBatch": "optsat.determine",
     "ComponentBox": "optsat.problems.component_box",
     "Export": "optsat.export.export",
+    "GoalAttainment": "optsat.problems.goal_attainment",
     "InputError": "optsat.errors",
     "Isolation": "optsat.estimators.isolation",
+    "Minimax": "optsat.problems.minimax",
     "NotProvenError": "optsat.errors",
     "OptsatError": "optsat.errors",
     "Proof": "optsat.solution",
@@ -63,6 +69,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Attainment",
     "AttitudeSeries",
     "AttitudeStatus",
     "CertifiedAttitude",
@@ -70,8 +77,10 @@ __all__ = [
     "CertifiedBatch",
     "ComponentBox",
     "Export",
+    "GoalAttainment",
     "InputError",
     "Isolation",
+    "Minimax",
     "NotProvenError",
     "OptsatError",
     "Proof",

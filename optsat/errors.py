@@ -3,6 +3,7 @@
 import difflib
 import functools
 import inspect
+import typing
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
@@ -64,7 +65,32 @@ def nearest_name(name: str, known: list[str]) -> str:
 
 def explain_unknown_options(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a public function so that a misspelt keyword names the nearest option instead of a bare TypeError."""
-    return _checked(function, function.__name__, list(inspect.signature(function).parameters))
+    checked = _checked(function, function.__name__, list(_written_out(function).parameters))
+    setattr(checked, "__signature__", _written_out(function))  # noqa: B010
+    return checked
+
+
+class _Optional:
+    """Default of an option that a table of options holds: shown as stub files show it."""
+
+    def __repr__(self) -> str:
+        return "..."
+
+
+def _written_out(function: Callable[..., object]) -> inspect.Signature:
+    """Return the signature with every option of an unpacked table by its own name, as help shows it."""
+    signature = inspect.signature(function)
+    parameters = []
+    for each in signature.parameters.values():
+        table = typing.get_args(each.annotation)
+        if each.kind is not inspect.Parameter.VAR_KEYWORD or not table:
+            parameters.append(each)
+            continue
+        parameters += [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=_Optional())
+            for name in typing.get_type_hints(table[0])
+        ]
+    return signature.replace(parameters=parameters)
 
 
 def explain_unknown_fields(data: type[T]) -> type[T]:

@@ -10,7 +10,8 @@ from optsat.certificates.dual_bound import dual_bound
 from optsat.certificates.first_order import FirstOrder, first_order
 from optsat.convex_rows import convex_rows
 from optsat.forms import MinMaxForm, Point
-from optsat.problems.goal_attainment import FEASIBLE, Attainment, GoalAttainment
+from optsat.problems.attainment import FEASIBLE, Attainment
+from optsat.problems.multi_objective import MultiObjective
 from optsat.smooth_map import CallableMap, SmoothMap, SymbolicMap, no_values
 from optsat.solution import Proof, Solution
 
@@ -26,7 +27,7 @@ class LeastViolation:
     the least violation is positive, NOTHING when the violation is merely stationary.
     """
 
-    problem: GoalAttainment
+    problem: MultiObjective
     form: MinMaxForm = field(init=False, repr=False)
     places: Array = field(init=False, repr=False)
 

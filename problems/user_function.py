@@ -1,7 +1,7 @@
 """User function: what a user may hand in as objectives or constraints, turned into a smooth map of the unknowns."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -149,7 +149,23 @@ def _function(name: str, unknowns: Unknowns, column: Any) -> Any:
         raise InputError(
             f"`{name}` uses {', '.join(map(str, function.get_free()))}, which is neither in `x` nor in `parameters`."
         )
-    return scalar_instructions(function)
+    function = scalar_instructions(function)
+    # what calls other functions may call back into Python, which its text does not tell
+    return _kept(_Written(function.serialize(), function)) if function.is_a("SXFunction") else function
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A Function of scalar instructions, equal to another that computes the same."""
+
+    text: str
+    function: Any = field(compare=False)
+
+
+# one Function for equal expressions, so that a problem written again finds its derivatives and solvers ready
+@lru_cache(maxsize=64)
+def _kept(written: _Written) -> Any:
+    return written.function
 
 
 def _of_callable(name: str, function: Callable[..., Any], unknowns: Unknowns) -> CallableMap:

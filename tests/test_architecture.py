@@ -15,7 +15,7 @@ MAPPED = ("problems", "solvers", "studies")
 LONGEST = 400
 
 # the public verbs pick problems and solvers for their callers
-VERBS = {"attain", "determine"}
+VERBS = {"attain", "attain_runs", "determine", "pareto"}
 # what knows everything: the public names and verbs, the command line, the studies
 TOP = {"__init__", *VERBS, "cli", "commands", "doctor", "studies"}
 

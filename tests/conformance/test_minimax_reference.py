@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from optsat.attain import EngineRun, goal_attain, minimax
+from optsat.attain import goal_attain, minimax
+from optsat.attain_runs import EngineRun
 from optsat.forms import MinMaxForm
-from optsat.problems.goal_attainment import Attainment, GoalAttainment
+from optsat.problems.attainment import Attainment
+from optsat.problems.goal_attainment import GoalAttainment
 from optsat.problems.minimax import Minimax
 from optsat.problems.reference_fitting import FITTING
 from optsat.problems.reference_minimax import MINIMAX

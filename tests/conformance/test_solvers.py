@@ -18,7 +18,8 @@ from optsat.attitude.status import AttitudeStatus
 from optsat.errors import InputError, UnsupportedFormError
 from optsat.forms import Point
 from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
-from optsat.problems.goal_attainment import Attainment, GoalAttainment
+from optsat.problems.attainment import Attainment
+from optsat.problems.goal_attainment import GoalAttainment
 from optsat.problems.refined_enclosure import RefinedEnclosure
 from optsat.problems.wahba import Wahba, WahbaAttitude
 from optsat.solution import Proof, Solution, Termination

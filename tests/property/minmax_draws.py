@@ -94,7 +94,7 @@ def nonconvex_problem(rng: np.random.Generator) -> Drawn:
         objectives.append(kinds[int(rng.integers(len(kinds)))])
     absolute = [0] if rng.random() < 0.3 else []
     return Drawn(
-        Minimax(x, ca.vertcat(*objectives), absolute, lb=-2, ub=2, start=rng.uniform(-2, 2, 2)),
+        Minimax(x, ca.vertcat(*objectives), absolute=absolute, lb=-2, ub=2, start=rng.uniform(-2, 2, 2)),
         float("nan"),
         np.full(2, np.nan),
     )

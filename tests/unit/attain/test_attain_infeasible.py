@@ -6,7 +6,7 @@ import pytest
 
 from optsat.attain import goal_attain, minimax
 from optsat.errors import NotProvenError
-from optsat.problems.goal_attainment import Attainment
+from optsat.problems.attainment import Attainment
 from optsat.problems.least_violation import LeastViolation
 from optsat.problems.minimax import Minimax
 from optsat.solution import Proof, Solution
@@ -65,7 +65,7 @@ def least_violation(upper: float) -> Solution[Attainment]:
     from optsat.solve import solve
 
     problem = Minimax(X, X[0], A=[[1, 0], [-1, 0]], b=[upper, -1], lb=-10, ub=10)
-    return solve(LeastViolation(problem.attainment))
+    return solve(LeastViolation(problem))
 
 
 def test_the_proof_is_sharp() -> None:

@@ -1,5 +1,6 @@
 """Every way to write one problem gives one answer: SX, MX, Function, generated function, callable, parameters."""
 
+import inspect
 from typing import Any
 
 import casadi as ca
@@ -9,6 +10,8 @@ import pytest
 from optsat.arrays import Array
 from optsat.attain import goal_attain, minimax
 from optsat.port import Port
+from optsat.problems.minimax import Minimax
+from optsat.smooth_map import SymbolicMap
 from optsat.solution import Proof, Solution
 from optsat.solvers import SOLVERS
 from optsat.solvers.ipopt import Ipopt
@@ -104,6 +107,38 @@ def test_a_function_that_cannot_be_expanded_runs_on_matrix_symbols() -> None:
     found = minimax(x, [table(x), 1 - x], start=[0.3])
     assert found.proof is Proof.STATIONARY
     assert found.answer.x[0] == pytest.approx((np.sqrt(5) - 1) / 2, abs=1e-6)
+
+
+class Square(ca.Callback):
+    """A function that lives in this process only; its derivatives are differences."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.construct("square", {"enable_fd": True})
+
+    def eval(self, arg: Any) -> list[Any]:
+        return [arg[0] ** 2]
+
+
+def test_an_expression_that_calls_back_into_python() -> None:
+    square, x = Square(), ca.MX.sym("x")
+    found = minimax(x, [square(x), 2 - x], start=[0.3])
+    assert found.answer.x[0] == pytest.approx(1, abs=1e-5)
+
+
+def test_equal_expressions_share_one_function() -> None:
+    first, second = (
+        Minimax(x, objectives(x, a), parameters=a, parameter_values=1) for x, a in map(symbols, [ca.SX] * 2)
+    )
+    maps = [each.form.objectives for each in (first, second)]
+    assert isinstance(maps[0], SymbolicMap)
+    assert isinstance(maps[1], SymbolicMap)
+    assert maps[0].function is maps[1].function
+
+
+def test_help_names_every_option() -> None:
+    for verb in (goal_attain, minimax):
+        assert {"lb", "Aeq", "constraints_ub", "parameter_values", "engine"} <= set(inspect.signature(verb).parameters)
 
 
 def test_equality_and_inequality_rows() -> None:

@@ -87,6 +87,16 @@ class ComponentBox:
     def __len__(self) -> int:
         return len(self._low)
 
+    @property
+    def midpoint(self) -> Array:
+        """The middles (m, 3) of the intervals, not scaled to length 1."""
+        return np.asarray((self._low + self._high) / 2)
+
+    @property
+    def radius(self) -> Array:
+        """Half of the widths (m, 3) of the intervals."""
+        return np.asarray((self._high - self._low) / 2)
+
     def midpoint_directions(self) -> Array:
         """Return the normalised midpoints (m, 3).
 

@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from optsat.estimators.attitude_series import AttitudeSeries, Window, certify_record
     from optsat.estimators.isolation import Isolation, isolate
     from optsat.export.export import Export, export_c
+    from optsat.export.offered import kernel
+    from optsat.kernels.kernel import Kernel
+    from optsat.kernels.open_kernel import make_kernel, open_kernel
+    from optsat.pareto import pareto_sweep
+    from optsat.pareto_front import ParetoFront, ParetoPoint
     from optsat.problems.attainment import Attainment
     from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
     from optsat.problems.component_box import ComponentBox
@@ -42,9 +47,12 @@ _HOME = {
     "GoalAttainment": "optsat.problems.goal_attainment",
     "InputError": "optsat.errors",
     "Isolation": "optsat.estimators.isolation",
+    "Kernel": "optsat.kernels.kernel",
     "Minimax": "optsat.problems.minimax",
     "NotProvenError": "optsat.errors",
     "OptsatError": "optsat.errors",
+    "ParetoFront": "optsat.pareto_front",
+    "ParetoPoint": "optsat.pareto_front",
     "Proof": "optsat.solution",
     "Record": "optsat.records.record",
     "RecordError": "optsat.errors",
@@ -61,7 +69,11 @@ _HOME = {
     "export_c": "optsat.export.export",
     "goal_attain": "optsat.attain",
     "isolate": "optsat.estimators.isolation",
+    "kernel": "optsat.export.offered",
+    "make_kernel": "optsat.kernels.open_kernel",
     "minimax": "optsat.attain",
+    "open_kernel": "optsat.kernels.open_kernel",
+    "pareto_sweep": "optsat.pareto",
     "read_csv_log": "optsat.records.csv_log",
     "statistical_angle_bound": "optsat.statistical_bound",
     "wahba": "optsat.determine",
@@ -80,9 +92,12 @@ __all__ = [
     "GoalAttainment",
     "InputError",
     "Isolation",
+    "Kernel",
     "Minimax",
     "NotProvenError",
     "OptsatError",
+    "ParetoFront",
+    "ParetoPoint",
     "Proof",
     "Record",
     "RecordError",
@@ -100,7 +115,11 @@ __all__ = [
     "export_c",
     "goal_attain",
     "isolate",
+    "kernel",
+    "make_kernel",
     "minimax",
+    "open_kernel",
+    "pareto_sweep",
     "read_csv_log",
     "solve",
     "statistical_angle_bound",

@@ -150,6 +150,16 @@ def build(name: str, precision: Precision = "double", **parameters: Any) -> Kern
     InputError : no such kernel or precision (the nearest name is offered), or a parameter that its definition refuses.
     UnknownOptionError : the kernel has no such parameter; the nearest is offered.
     """
+    return entry_named(name).function()(**chosen(name, precision, parameters))
+
+
+def chosen(name: str, precision: Precision, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keyword arguments of the definition: what the caller chose, the precision asks, and the name fixes.
+
+    Raises
+    ------
+    InputError, UnknownOptionError : as for `build`.
+    """
     entry = entry_named(name)
     if precision not in ARITHMETIC:
         raise InputError(f"`precision` must be 'double' or 'float', got {precision!r}.")
@@ -159,7 +169,7 @@ def build(name: str, precision: Precision = "double", **parameters: Any) -> Kern
             hint = nearest_name(given, known) if known else " It takes none."
             raise UnknownOptionError(f"Kernel {name} has no parameter `{given}`.{hint}")
     needed = {key: value for key, value in ARITHMETIC[precision].items() if key in known}
-    return entry.function()(**{**needed, **parameters, **entry.fixed})
+    return {**needed, **parameters, **entry.fixed}
 
 
 def entry_named(name: str) -> Entry:

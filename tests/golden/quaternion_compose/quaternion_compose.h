@@ -49,7 +49,7 @@ typedef struct {
  *   OS_E_NOT_UNIT       a length is off, or a vector has no direction
  *   OS_E_RANGE          an argument is outside its limits, or no covariance
  *   OS_E_OUTPUT         a result is not finite, or fails its own checks
- * The time of a call does not depend on the arguments but for the writing of the results. */
+ * No loop or branch depends on the arguments, but for the choice between the results and their safe values. */
 
 os_status_t quaternion_compose(const quaternion_compose_in_t *in, quaternion_compose_out_t *out);
 

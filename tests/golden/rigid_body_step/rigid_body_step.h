@@ -73,7 +73,7 @@ typedef struct {
  *   OS_E_NOT_UNIT       a length is off, or a vector has no direction
  *   OS_E_RANGE          an argument is outside its limits, or no covariance
  *   OS_E_OUTPUT         a result is not finite, or fails its own checks
- * The time of a call does not depend on the arguments but for the writing of the results. */
+ * No loop or branch depends on the arguments, but for the choice between the results and their safe values. */
 
 os_status_t rigid_body_init(rigid_body_step_state_t *state, const rigid_body_step_cfg_t *cfg);
 os_status_t rigid_body_step(

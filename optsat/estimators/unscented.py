@@ -55,8 +55,9 @@ def unscented_step(
     """Return one step, prediction and update: (x, P, u..., z, Q, R) -> (x, P, innovation, S, log_likelihood, definite).
 
     The points of P go through f; points of the predicted covariance, Q included, through h, so that a linear model
-    gives the Kalman filter exactly. P = P_ - K S K^T, symmetric to the bit. S is the covariance of the innovation,
-    log_likelihood that of the innovation; definite is 1 where P, its prediction and S were positive definite.
+    gives the Kalman filter exactly. Where h is linear in the state, its moments are known without points, and taken.
+    P = P_ - K S K^T, symmetric to the bit. S is the covariance of the innovation, log_likelihood that of the
+    innovation; definite is 1 where P, its prediction and S were positive definite.
 
     points : spread and weights of the sigma points
     noise : "full", Q and R are matrices of which the lower triangle is read; "diagonal", columns of variances
@@ -78,13 +79,10 @@ def unscented_step(
     P = symmetric(moved.covariance(centre_weight) + given.Q)
 
     after = cholesky(P, rounding)
-    seen = _Images.of(model.h(given.u), predicted, after.L, spread)
-    expected = seen.mean()
+    expected, covariance, cross = _measured(model.h(given.u), predicted, P, after.L, spread, centre_weight)
     innovation = model.on_the_side_of(expected, given.z) - expected
-    S = symmetric(seen.covariance(centre_weight) + given.R)
+    S = symmetric(covariance + given.R)
     factor = cholesky(S, rounding)
-    # the deviations of the points are the columns of L, so their product with those of the images is triangular
-    cross = after.L @ seen.differences().T * (0.5 / math.sqrt(spread))
     gain_root = factor.solve(cross.T).T
     whitened = factor.solve(innovation)
     definite = ca.logic_and(before.definite, ca.logic_and(after.definite, factor.definite))
@@ -98,6 +96,23 @@ def unscented_step(
         likelihood=log_likelihood(factor, whitened),
         definite=definite,
     )
+
+
+def _measured(
+    h: Callable[[Value], Value], x: Value, P: Value, L: Value, spread: float, centre_weight: float
+) -> tuple[Value, Value, Value]:
+    """Return mean and covariance of h, the lower triangle counting, and the covariance of the state with it."""
+    import casadi as ca
+
+    state = ca.SX.sym("state", x.numel())
+    image = h(state)
+    if ca.is_linear(image, state):
+        H = ca.jacobian(image, state)
+        cross = P @ H.T
+        return h(x), H @ cross, cross
+    seen = _Images.of(h, x, L, spread)
+    # the deviations of the points are the columns of L, so their product with those of the images is triangular
+    return seen.mean(), seen.covariance(centre_weight), L @ seen.differences().T * (0.5 / math.sqrt(spread))
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ OPERATIONS = {
     "sun": 44,
     "certified_two_vector": 1342,
     "extended_filter_7": 4937,
-    "unscented_filter_7": 8161,
+    "unscented_filter_7": 6714,
     **{f"wahba_{n}": 403 + 21 * n for n in range(2, 11)},
 }
 

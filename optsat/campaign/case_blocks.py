@@ -8,10 +8,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from optsat.campaign.rows import BLOCK, Cases
+from optsat.campaign.rows import Cases
 from optsat.campaign.table import Kinds
 
-_BLOCK_BYTES = 1 << 25
+_MOST_CASES, _MOST_BYTES = 4096, 1 << 25
 WORDS = np.dtype(object)
 
 Block: TypeAlias = Mapping[str, NDArray[Any]]
@@ -25,7 +25,7 @@ def result_kinds(cases: Cases) -> Kinds:
 def block_length(kinds: Kinds) -> int:
     """Return the cases of one block: 4096, and fewer where they would take more than 32 MB."""
     size = sum(8 * int(np.prod(kind.shape, dtype=np.int64)) for kind in kinds.values())
-    return max(1, min(BLOCK, _BLOCK_BYTES // max(size, 1)))
+    return max(1, min(_MOST_CASES, _MOST_BYTES // max(size, 1)))
 
 
 def case_blocks(cases: Cases, count: int) -> Iterator[tuple[int, Block]]:

@@ -3,18 +3,13 @@
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
-from numpy.typing import NDArray
 
-from optsat.campaign.designs import Columns
 from optsat.campaign.result import Failure
 from optsat.campaign.study import Row
 from optsat.campaign.table import Kinds, Table, joined_kinds
-
-BLOCK = 4096
-"""Cases of one block; blocks begin at multiples of it among the rows, whatever the chunks were."""
 
 _HELD_BYTES = 1 << 22
 
@@ -22,19 +17,14 @@ _HELD_BYTES = 1 << 22
 class Rows(Sequence[Row]):
     """One row a case that ran, in case order, its number under "case"; equal to any sequence of the same rows.
 
-    `for row in rows` reads the tables once; `column` and `blocks` give arrays. Of a run in a folder, small ones are
-    kept in memory and the others read from it each time, so the folder must stay until then.
+    Small runs are kept in memory; larger ones in a folder are read from it each time, so metrics that go through them
+    once hold none of them, and the folder must stay until then.
     """
 
     def __init__(self, load: Callable[[int], Table], lengths: Sequence[int], kinds: Kinds) -> None:
         self._load, self.kinds = load, kinds
         self._starts = list(itertools.accumulate(lengths, initial=0))
         self._last: tuple[int, Sequence[Row]] = (-1, ())
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns, "case" first."""
-        return tuple(self.kinds)
 
     def __len__(self) -> int:
         return self._starts[-1]
@@ -66,27 +56,6 @@ class Rows(Sequence[Row]):
     def tables(self) -> Iterator[Table]:
         """Yield the tables in case order, each column of one kind in all."""
         return (self._table(k) for k in range(len(self._starts) - 1))
-
-    def column(self, name: str) -> NDArray[Any]:
-        """Return one column of all rows."""
-        return np.concatenate([table.columns[name] for table in self.tables() if table.columns])
-
-    def blocks(self) -> Iterator[Columns]:
-        """Yield the columns in blocks of 4096 rows: what is summed over them does not depend on the chunks."""
-        waiting: dict[str, list[NDArray[Any]]] = {name: [] for name in self.kinds}
-        held = 0
-        for table in self.tables():
-            for name, parts in waiting.items():
-                if table.columns:
-                    parts.append(table.columns[name])
-            held += len(table)
-            while held >= BLOCK:
-                whole = {name: np.concatenate(parts) for name, parts in waiting.items()}
-                yield {name: column[:BLOCK] for name, column in whole.items()}
-                waiting = {name: [column[BLOCK:]] for name, column in whole.items()}
-                held -= BLOCK
-        if held:
-            yield {name: np.concatenate(parts) for name, parts in waiting.items()}
 
     def _table(self, k: int) -> Table:
         return self._load(k).of_kinds(self.kinds)

@@ -28,7 +28,8 @@ from optsat.errors import InputError
 _CHUNK_S = 2.0
 _WARM_S = 1.0
 _CHUNK_BYTES = 1 << 26
-_BATCH = 256
+_FIRST_BATCH = 16
+_MEASURED_S = 0.05
 _MOST_CASES_A_CHUNK = 4096
 _LEAST_CHUNKS_A_WORKER = 4
 
@@ -131,19 +132,35 @@ def _chunks(count: int, size: int) -> list[Chunk]:
 
 
 def _chunk_size(study: Study, layout: Layout, workers: int) -> int:
-    """Return cases for about two seconds of work or 64 MB, from the first case; no result depends on it."""
+    """Return cases for about two seconds of work or 64 MB, from the first cases; no result depends on it."""
     numerics_print()
-    second, size = _cost_a_case(study, layout, 1)
-    if second < _WARM_S:
-        # the first run of a short case is mostly imports; a batch shows its speed with many
-        second, size = _cost_a_case(study, layout, min(layout.count, _BATCH if study.run_batch is not None else 1))
+    second, size = _cost_of_one(study, layout) if study.run_batch is None else _cost_in_a_batch(study, layout)
     most = max(1, layout.count // (_LEAST_CHUNKS_A_WORKER * workers))
     by_time = round(_CHUNK_S / max(second, 1e-9))
     return max(1, min(most, _MOST_CASES_A_CHUNK, by_time, int(_CHUNK_BYTES // max(size, 1.0))))
 
 
+def _cost_of_one(study: Study, layout: Layout) -> tuple[float, float]:
+    """Return seconds and bytes of a case that runs alone."""
+    cost = _cost_a_case(study, layout, 1)
+    # the first run of a short case is mostly imports
+    return cost if cost[0] >= _WARM_S else _cost_a_case(study, layout, 1)
+
+
+def _cost_in_a_batch(study: Study, layout: Layout) -> tuple[float, float]:
+    """Return seconds and bytes a case in batches of growing length, until one takes a while."""
+    most = min(layout.count, _MOST_CASES_A_CHUNK)
+    cases = min(most, _FIRST_BATCH)
+    while True:
+        # what runs for the first time is mostly compilation
+        _cost_a_case(study, layout, cases)
+        second, size = _cost_a_case(study, layout, cases)
+        if cases == most or second * cases > _MEASURED_S:
+            return second, size
+        cases = min(most, 8 * cases)
+
+
 def _cost_a_case(study: Study, layout: Layout, cases: int) -> tuple[float, float]:
-    """Return seconds and bytes a case."""
     start = time.perf_counter()
     table = run_cases(study, layout, range(cases)).table
     second = time.perf_counter() - start

@@ -14,7 +14,7 @@ from optsat.solve import solve
 if TYPE_CHECKING:
     from optsat.attain import goal_attain, minimax
     from optsat.attitude.status import AttitudeStatus
-    from optsat.determine import CertifiedBatch, certify_attitude, certify_attitude_batch, wahba
+    from optsat.determine import CertifiedBatch, certify_attitude, certify_attitude_batch, wahba, worst_case_wahba
     from optsat.errors import InputError, NotProvenError, OptsatError, RecordError, UnknownOptionError
     from optsat.estimators.attitude_series import AttitudeSeries, Window, certify_record
     from optsat.estimators.isolation import Isolation, isolate
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from optsat.kernels.kernel import Kernel
     from optsat.kernels.open_kernel import make_kernel, open_kernel
     from optsat.pareto import pareto_sweep
-    from optsat.pareto_front import ParetoFront, ParetoPoint
     from optsat.problems.attainment import Attainment
     from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
     from optsat.problems.component_box import ComponentBox
     from optsat.problems.goal_attainment import GoalAttainment
     from optsat.problems.minimax import Minimax
+    from optsat.problems.pareto_front import ParetoFront, ParetoPoint
     from optsat.problems.wahba import Wahba, WahbaAttitude
     from optsat.records.csv_log import read_csv_log, write_csv_log
     from optsat.records.record import Record, VectorChannel
@@ -51,8 +51,8 @@ _HOME = {
     "Minimax": "optsat.problems.minimax",
     "NotProvenError": "optsat.errors",
     "OptsatError": "optsat.errors",
-    "ParetoFront": "optsat.pareto_front",
-    "ParetoPoint": "optsat.pareto_front",
+    "ParetoFront": "optsat.problems.pareto_front",
+    "ParetoPoint": "optsat.problems.pareto_front",
     "Proof": "optsat.solution",
     "Record": "optsat.records.record",
     "RecordError": "optsat.errors",
@@ -77,6 +77,7 @@ _HOME = {
     "read_csv_log": "optsat.records.csv_log",
     "statistical_angle_bound": "optsat.statistical_bound",
     "wahba": "optsat.determine",
+    "worst_case_wahba": "optsat.determine",
     "write_csv_log": "optsat.records.csv_log",
 }
 
@@ -124,6 +125,7 @@ __all__ = [
     "solve",
     "statistical_angle_bound",
     "wahba",
+    "worst_case_wahba",
     "write_csv_log",
 ]
 

@@ -15,9 +15,8 @@ from optsat.solution import Proof, Solution, Termination
 from optsat.solve import Solver, solve
 
 if TYPE_CHECKING:
-    from optsat.problems.attainment import Attainment
+    from optsat.problems.attainment import Attainment, MinMaxProblem
     from optsat.problems.least_violation import LeastViolation
-    from optsat.problems.multi_objective import MultiObjective
 
 # KKT residual of an answer that is taken without trying the next engine
 _ACCURATE = 1e-8
@@ -50,7 +49,7 @@ class EngineRun:
 class _Search:
     """The runs of one call, in order, with the engines that may take part."""
 
-    def __init__(self, problem: "MultiObjective", engine: "str | Solver") -> None:
+    def __init__(self, problem: "MinMaxProblem", engine: "str | Solver") -> None:
         self.problem = problem
         self.form = problem.lower()
         self.engine = engine
@@ -65,7 +64,7 @@ class _Search:
                 break
 
     def once(
-        self, problem: "MultiObjective | LeastViolation", engine: "Solver", number: int, start: Point
+        self, problem: "MinMaxProblem | LeastViolation", engine: "Solver", number: int, start: Point
     ) -> "Solution[Attainment]":
         """Run one engine and keep its answer and how it was judged."""
         began = perf_counter()
@@ -91,7 +90,7 @@ class _Search:
 
 
 def best_attainment(
-    problem: "MultiObjective",
+    problem: "MinMaxProblem",
     start: "ArrayLike | Solution[Attainment] | None",
     starts: int,
     seed: int,

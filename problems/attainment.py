@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -59,6 +60,28 @@ class Attainment:
             conflict = f" These stand against each other: {', '.join(self.conflicting)}." if self.conflicting else ""
             return f"No point was found that satisfies all constraints; the nearest one violates {worst}.{conflict}"
         return f"Attainment factor {self.factor:.9g}, determined by the objectives {list(self.active)}."
+
+
+class MinMaxProblem(Protocol):
+    """A problem that is a min-max form with names for its rows."""
+
+    @property
+    def form(self) -> MinMaxForm:
+        """The min-max form."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all entries of the form's `dual`, as a user knows them."""
+        ...
+
+    def lower(self) -> MinMaxForm:
+        """Return the min-max form."""
+        ...
+
+    def interpret(self, point: Point, solver: str) -> Solution[Attainment]:
+        """Return the attainment at the point."""
+        ...
 
 
 def attained(form: MinMaxForm, names: Sequence[str], point: Point, solver: str) -> Solution[Attainment]:

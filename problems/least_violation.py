@@ -10,8 +10,7 @@ from optsat.certificates.dual_bound import dual_bound
 from optsat.certificates.first_order import FirstOrder, first_order
 from optsat.convex_rows import convex_rows
 from optsat.forms import MinMaxForm, Point
-from optsat.problems.attainment import FEASIBLE, Attainment
-from optsat.problems.multi_objective import MultiObjective
+from optsat.problems.attainment import FEASIBLE, Attainment, MinMaxProblem
 from optsat.smooth_map import CallableMap, SmoothMap, SymbolicMap, no_values
 from optsat.solution import Proof, Solution
 
@@ -27,7 +26,7 @@ class LeastViolation:
     the least violation is positive, NOTHING when the violation is merely stationary.
     """
 
-    problem: MultiObjective
+    problem: MinMaxProblem
     form: MinMaxForm = field(init=False, repr=False)
     places: Array = field(init=False, repr=False)
 

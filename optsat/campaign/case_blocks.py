@@ -79,7 +79,8 @@ def content_hash(cases: Cases, count: int) -> str:
 
 def _bytes(column: NDArray[Any]) -> bytes:
     if column.dtype == WORDS:
-        return b"".join(json.dumps(word).encode() + b"," for word in column.ravel())
+        # without its brackets, so that the bytes of two blocks are those of both in one
+        return json.dumps(column.ravel().tolist(), separators=(",", ":"))[1:-1].encode() + b","
     return np.ascontiguousarray(column, dtype=column.dtype.newbyteorder("<")).tobytes()
 
 

@@ -19,6 +19,7 @@ from optsat.errors import InputError, OptsatError
 # What a computation may raise on unlucky data. Anything else (a TypeError, a misspelt name) is a mistake in the
 # study and stops the campaign with its traceback.
 _CASE_ERRORS = (OptsatError, ArithmeticError, ValueError, RuntimeError)
+_PLAIN = (float, int, bool, str)
 _KINDS = {"b": np.bool_, "i": np.int64, "u": np.int64, "f": np.float64, "U": np.str_}
 
 
@@ -48,6 +49,8 @@ def _outcome(study: Study, key: int, number: int, case: Case) -> Row | Failure:
         row = study.run(case, case_generator(key, number))
     except _CASE_ERRORS as error:
         return Failure(number, type(error).__name__, str(error))
+    if all(type(value) in _PLAIN for value in row.values()):
+        return {"case": number, **row}
     return {"case": number, **{name: _value(study, number, name, value) for name, value in row.items()}}
 
 

@@ -5,6 +5,8 @@ import json
 from operator import index
 
 import numpy as np
+from numpy.random.bit_generator import ISeedSequence
+from numpy.typing import NDArray
 
 from optsat.errors import InputError
 
@@ -30,4 +32,19 @@ def case_generator(key: int, cell: int, stream: int = 0) -> np.random.Generator:
         raise InputError(f"`cell` and `stream` must be >= 0, got {cell} and {stream}.")
     words = np.array([key, cell], dtype=np.uint64)
     counter = np.array([0, 0, stream, 0], dtype=np.uint64)
-    return np.random.Generator(np.random.Philox(key=words, counter=counter))
+    return np.random.Generator(np.random.Philox(_Key(words), counter=counter))
+
+
+class _Key(ISeedSequence):
+    """The two words themselves where NumPy asks a seed for some; given as `key` NumPy first gathers entropy for naught.
+
+    It cannot be spawned from, so that no case draws from a stream that another run would not repeat.
+    """
+
+    __slots__ = ("_words",)
+
+    def __init__(self, words: NDArray[np.uint64]) -> None:
+        self._words = words
+
+    def generate_state(self, n_words: int, dtype: object = np.uint32) -> NDArray[np.uint64]:
+        return self._words

@@ -16,6 +16,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
 from optsat.campaign.case_blocks import case_blocks, content_hash, result_kinds
 from optsat.campaign.final_file import write_final_file
 from optsat.campaign.result import StudyResult
@@ -94,10 +96,10 @@ def _write_csv(stream: BinaryIO, cases: Cases, count: int) -> None:
     for start, block in case_blocks(cases, count):
         stop = start + len(block["status"])
         lists = [range(start, stop), block["failure"], *(block[name].tolist() for name in names)]
-        table.writerows(
-            (line[0], line[1], *[""] * len(names)) if failed else line
-            for failed, line in zip(block["status"].tolist(), zip(*lists, strict=True), strict=True)
-        )
+        lines = list(zip(*lists, strict=True))
+        for failed in np.flatnonzero(block["status"]):
+            lines[failed] = (*lines[failed][:2], *[""] * len(names))
+        table.writerows(lines)
         stream.write(text.getvalue().encode())
         text.seek(0)
         text.truncate()

@@ -1,8 +1,8 @@
 """What the campaign engine costs: time a case where cases are trivial, share of time where they are short, memory.
 
 Every campaign runs into a folder that keeps each chunk, in a process of its own, after a small one that loads what is
-imported. Time a case is that of the whole campaign: workers started, chunks, final files and metrics. A batch of trivial
-cases is done before two workers have started; their figure is given without a bar.
+imported. Time a case is that of the whole campaign: workers started, chunks, final files and metrics. A batch of
+trivial cases is done before two workers have started; their figure is given without a bar.
 """
 
 import concurrent.futures

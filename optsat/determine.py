@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from optsat.problems.certified_attitude import CertifiedAttitude
     from optsat.problems.component_box import ComponentBox
     from optsat.problems.wahba import WahbaAttitude
+    from optsat.problems.worst_case_wahba import WorstCaseAttitude
 
 WahbaMethod = Literal["davenport", "svd", "two_vector", "triad"]
 Refinement = Literal["cells", "subpaving"]
@@ -96,6 +97,41 @@ def certify_attitude(
 
     refined = solve(RefinedEnclosure(attitude), CellCoverSolver() if refine == "cells" else SubpavingSolver())
     return refined.answer
+
+
+@explain_unknown_options
+def worst_case_wahba(
+    b_B: "ComponentBox",
+    r_N: "ComponentBox | ArrayLike",
+    weights: ArrayLike | None = None,
+    *,
+    norm_policy: NormPolicy = "warn",
+) -> "Solution[WorstCaseAttitude]":
+    """Return the attitude whose Wahba loss is least when every direction is at its worst in its box.
+
+    A worst case, not an accuracy: its mean attitude error is the plain solution's or more. To determine an attitude
+    take `wahba`; to bound its error, `certify_attitude`.
+
+    b_B : ComponentBox of m measured directions; r_N : ComponentBox, or (m, 3) exactly known directions
+    weights : (m,) >= 0, equal when None
+    Proof GLOBAL: the worst-case loss meets its lower bound; `certificate` re-proves it without a solver, and how far an
+    attitude as good may be. STATIONARY or FEASIBLE: `answer.lower_bound` still holds for every attitude.
+
+    Raises
+    ------
+    InputError : input that cannot be used; the message names the argument. InfeasibleBoxError : a box holds no unit
+    vector.
+    Source: robust Wahba specification, section 7.4.
+    """
+    from optsat.problems.worst_case_epigraph import WorstCaseEpigraph
+    from optsat.problems.worst_case_wahba import WorstCaseWahba
+    from optsat.solvers.clarabel import Clarabel
+
+    problem = WorstCaseWahba(b_B, r_N, weights, norm_policy)
+    solution = solve(problem, Clarabel(tolerance=1e-12, prescaled=True))
+    if solution.proof is Proof.GLOBAL:
+        return solution
+    return solve(WorstCaseEpigraph(problem, solution))
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from optsat.attitude.status import AttitudeStatus
 from optsat.certificates.attitude_bound import ROUNDOFF, Ball, ball_of, sum_about
 from optsat.certificates.cell_cover import CellCover
 from optsat.certificates.certificate import Verdict
+from optsat.certificates.stored_fields import StoredFields
 from optsat.certificates.subpaving import Subpaving
 from optsat.errors import CertificateFormatError
 
@@ -149,15 +150,10 @@ class AttitudeCertificate:
         ------
         CertificateFormatError : not JSON, another format, a field missing, of the wrong type or shape.
         """
-        try:
-            content = json.loads(text)
-        except ValueError as error:
-            raise CertificateFormatError(f"The certificate is not JSON: {error}.") from None
-        if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise CertificateFormatError(f"The certificate's `format` must be {FORMAT!r}.")
-        reader = _Reader(content)
+        reader = StoredFields.of(text, FORMAT)
+        content = reader.content
         m = len(reader.array("angle_bound_rad", (None,)))
-        cuts = _Reader(reader.mapping("cuts"), "cuts.")
+        cuts = StoredFields(reader.mapping("cuts"), "cuts.")
         k = len(cuts.array("level", (None,)))
         admissible = AdmissibleSet(
             reader.array("b_B", (m, 3)),
@@ -205,7 +201,7 @@ def _read_refinement(content: Any, count: int) -> CellCover | Subpaving | None:
         return None
     if not isinstance(content, dict) or content.get("kind") not in ("cells", "subpaving"):
         raise CertificateFormatError("`refinement` must be null or an object with `kind` cells or subpaving.")
-    reader = _Reader(content, "refinement.")
+    reader = StoredFields(content, "refinement.")
     pivot, weights = reader.array("pivot_BN", (4,)), reader.array("pivot_weights", (count,))
     scale = float(reader.array("scale", ()))
     if content["kind"] == "cells":
@@ -234,35 +230,3 @@ def _read_refinement(content: Any, count: int) -> CellCover | Subpaving | None:
         reader.array("centre_BN", (4,)),
         float(reader.array("bound_rad", ())),
     )
-
-
-@dataclass(frozen=True)
-class _Reader:
-    """Typed access to a JSON object, so that a damaged file names its field."""
-
-    content: dict[str, Any]
-    prefix: str = ""
-
-    def mapping(self, name: str) -> dict[str, Any]:
-        value = self.content.get(name)
-        if not isinstance(value, dict):
-            raise CertificateFormatError(f"`{self.prefix}{name}` must be an object, got {type(value).__name__}.")
-        return value
-
-    def array(self, name: str, shape: tuple[int | None, ...]) -> Array:
-        if name not in self.content:
-            raise CertificateFormatError(f"`{self.prefix}{name}` is missing.")
-        try:
-            array = np.array(self.content[name], dtype=np.float64)
-        except (TypeError, ValueError):
-            raise CertificateFormatError(f"`{self.prefix}{name}` must hold numbers.") from None
-        if array.size == 0 and len(shape) == 2:
-            array = array.reshape(0, shape[1] or 0)
-        fits = array.ndim == len(shape) and all(
-            want is None or want == got for want, got in zip(shape, array.shape, strict=True)
-        )
-        if not fits or not np.all(np.isfinite(array)):
-            raise CertificateFormatError(
-                f"`{self.prefix}{name}` must be finite numbers of shape {shape}, got {array.shape}."
-            )
-        return array

@@ -10,7 +10,7 @@ from optsat.commands.output import AsJson, aligned, print_json
 from optsat.errors import CertificateFormatError
 
 if TYPE_CHECKING:
-    from optsat.certificates.attitude_certificate import AttitudeCertificate
+    from optsat.certificates.certificate import Certificate
 
 _MOST_REJECTED = 20
 
@@ -42,8 +42,8 @@ def verify_command(
         raise typer.Exit(1)
 
 
-def _read(file: Path) -> "list[tuple[int, AttitudeCertificate]]":
-    from optsat.certificates.attitude_certificate import AttitudeCertificate
+def _read(file: Path) -> "list[tuple[int, Certificate]]":
+    from optsat.certificates.certificate_file import read_certificate
 
     try:
         text = file.read_text(encoding="utf-8")
@@ -56,7 +56,7 @@ def _read(file: Path) -> "list[tuple[int, AttitudeCertificate]]":
     for number, line in enumerate(lines, start=1):
         if line.strip():
             try:
-                found.append((number, AttitudeCertificate.from_json(line)))
+                found.append((number, read_certificate(line)))
             except CertificateFormatError as error:
                 where = f"{file}, line {number}" if len(lines) > 1 else str(file)
                 raise CertificateFormatError(f"{where}: {error}") from None
@@ -65,7 +65,7 @@ def _read(file: Path) -> "list[tuple[int, AttitudeCertificate]]":
     return found
 
 
-def _examined(line: int, certificate: "AttitudeCertificate") -> dict[str, Any]:
+def _examined(line: int, certificate: "Certificate") -> dict[str, Any]:
     import numpy as np
 
     verdict = certificate.verify()

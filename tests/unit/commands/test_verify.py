@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from orbit_minute import invoke, write_log
 
-from optsat.determine import certify_attitude
+from optsat.determine import certify_attitude, worst_case_wahba
+from optsat.problems.component_box import ComponentBox
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +103,17 @@ def test_unreadable_files(name: str, data: bytes | None, says: str, tmp_path: Pa
     assert result.exit_code == 2
     assert says in result.stderr
     assert result.stdout == ""
+
+
+def test_certificates_of_a_worst_case_are_known_too(tmp_path: Path) -> None:
+    b, r = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]]
+    worst = worst_case_wahba(ComponentBox.from_half_width(b, 0.02), r).answer.certificate.to_json()
+    file = tmp_path / "both.jsonl"
+    file.write_text(f"{worst}\n{certify_attitude(b, r, 0.02).certificate.to_json()}\n", encoding="utf-8")
+    accepted = invoke("verify", file)
+    assert accepted.exit_code == 0
+    assert "2 certificates accepted, 0 rejected" in accepted.output
+    file.write_text(changed(worst, gap=0.0), encoding="utf-8")
+    rejected = invoke("verify", file)
+    assert rejected.exit_code == 1
+    assert "recomputed gap" in rejected.output

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from optsat.problems.wahba import Wahba, WahbaAttitude
     from optsat.records.csv_log import read_csv_log, write_csv_log
     from optsat.records.record import Record, VectorChannel
+    from optsat.robust import WorstCase, robust_minimax
     from optsat.solution import Proof, Solution, Termination
     from optsat.statistical_bound import statistical_angle_bound
 
@@ -63,6 +64,7 @@ _HOME = {
     "Wahba": "optsat.problems.wahba",
     "WahbaAttitude": "optsat.problems.wahba",
     "Window": "optsat.estimators.attitude_series",
+    "WorstCase": "optsat.robust",
     "certify_attitude": "optsat.determine",
     "certify_attitude_batch": "optsat.determine",
     "certify_record": "optsat.estimators.attitude_series",
@@ -75,6 +77,7 @@ _HOME = {
     "open_kernel": "optsat.kernels.open_kernel",
     "pareto_sweep": "optsat.pareto",
     "read_csv_log": "optsat.records.csv_log",
+    "robust_minimax": "optsat.robust",
     "statistical_angle_bound": "optsat.statistical_bound",
     "wahba": "optsat.determine",
     "worst_case_wahba": "optsat.determine",
@@ -109,6 +112,7 @@ __all__ = [
     "Wahba",
     "WahbaAttitude",
     "Window",
+    "WorstCase",
     "__version__",
     "certify_attitude",
     "certify_attitude_batch",
@@ -122,6 +126,7 @@ __all__ = [
     "open_kernel",
     "pareto_sweep",
     "read_csv_log",
+    "robust_minimax",
     "solve",
     "statistical_angle_bound",
     "wahba",

@@ -15,12 +15,12 @@ MAPPED = ("problems", "solvers", "studies")
 LONGEST = 400
 
 # the public verbs pick problems and solvers for their callers
-VERBS = {"attain", "attain_runs", "determine", "pareto"}
+VERBS = {"attain", "attain_runs", "determine", "pareto", "robust"}
 # what knows everything: the public names and verbs, the command line, the studies
 TOP = {"__init__", *VERBS, "cli", "commands", "doctor", "studies"}
 
 # slow to import, so only inside functions
-HEAVY = ("casadi", "clarabel", "cvxpy", "matplotlib", "scipy.optimize", "typer")
+HEAVY = ("casadi", "clarabel", "cvxpy", "matplotlib", "pymoo", "scipy.optimize", "typer")
 EAGER_ALLOWED = {("cli", "typer"), ("commands", "typer")}
 
 

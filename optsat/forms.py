@@ -1,6 +1,6 @@
 """Forms: the few standard shapes that problems lower themselves to and solvers accept."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
@@ -146,3 +146,18 @@ class MinMaxForm:
         """Return the least t that the rows of positive weight allow, for the values F (k,)."""
         soft = self.weight > 0
         return float(np.max(self.rows(objectives)[soft] / self.weight[soft]))
+
+
+@dataclass(frozen=True, eq=False)
+class FrontForm:
+    """Find the points of a box none of which is worse than another in every objective, by function values alone.
+
+    lower, upper (n,) : the box; evaluate : points (k, n) -> objectives (k, objectives) and constraints (k, constraints)
+    <= 0. `x` of a point is one member, `stats["members"]` (k, n) holds all of them, none where none was feasible.
+    """
+
+    lower: Array
+    upper: Array
+    objectives: int
+    constraints: int
+    evaluate: Callable[[Array], tuple[Array, Array]]

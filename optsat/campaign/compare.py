@@ -40,6 +40,9 @@ class Comparison:
     """Two runs side by side.
 
     changed : fields of the identity that differ, (A, B); same_bits : by file that both have
+    same_content : every value of every case is the same, to the bit
+    mixed : which of "A" and "B" were computed by machines whose arithmetic differs in the last bits
+    same_arithmetic : both were computed with the same last bits
     pairing : empty where cases are paired, else why they are not
     identical : columns with the same value in every case; missing : columns that only one run has
     arrays : largest absolute difference by array column, paired runs only
@@ -47,6 +50,9 @@ class Comparison:
 
     changed: Mapping[str, tuple[Any, Any]]
     same_bits: Mapping[str, bool]
+    same_content: bool
+    mixed: tuple[str, ...]
+    same_arithmetic: bool
     pairing: str
     identical: tuple[str, ...]
     missing: tuple[str, ...]
@@ -90,6 +96,9 @@ def compare_runs(a: FinishedRun, b: FinishedRun, study: Study | None = None) -> 
     return Comparison(
         changed,
         {name: a.digests[name] == b.digests[name] for name in a.digests if name in b.digests},
+        a.content == b.content,
+        tuple(name for name, run in (("A", a), ("B", b)) if len(run.numerics) > 1),
+        set(a.numerics) == set(b.numerics),
         pairing,
         identical,
         tuple(sorted((a.columns.keys() ^ b.columns.keys()) - {"case"})),

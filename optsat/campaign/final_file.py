@@ -1,5 +1,6 @@
 """Final file: every case of a run as NetCDF, written block by block, the same bytes whatever the chunks were."""
 
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from optsat.campaign.case_blocks import WORDS, block_length, case_blocks, result_kinds
+from optsat.campaign.disk import require_room
 from optsat.campaign.rows import Cases
 from optsat.campaign.table import Kinds
 from optsat.errors import MissingExtraError
 from optsat.files import durable_step, sync_folder
+
+_WORD_BYTES, _FILE_BYTES = 32, 1 << 15
 
 
 def write_final_file(path: Path, cases: Cases, count: int, attributes: Mapping[str, Any]) -> None:
@@ -32,6 +36,7 @@ def write_final_file(path: Path, cases: Cases, count: int, attributes: Mapping[s
     kinds = result_kinds(cases)
     temporary = path.with_name(f".{path.name}.{os.getpid():08x}")
     try:
+        require_room(temporary, _size(kinds, count))
         with h5netcdf.File(temporary, "w") as file:
             file.dimensions = {"case": count, **_axes(kinds)}
             file.attrs.update(attributes)
@@ -52,6 +57,12 @@ def write_final_file(path: Path, cases: Cases, count: int, attributes: Mapping[s
         raise
     sync_folder(path.parent)
     durable_step()
+
+
+def _size(kinds: Kinds, count: int) -> int:
+    """Return about how many bytes the file takes: columns, `status` and `failure`, and what HDF5 adds."""
+    a_case = sum(_WORD_BYTES if kind.kind == "U" else 8 * math.prod(kind.shape) for kind in kinds.values())
+    return round(1.02 * count * (a_case + 1 + _WORD_BYTES)) + _FILE_BYTES
 
 
 def _axes(kinds: Kinds) -> dict[str, int]:

@@ -32,6 +32,7 @@ class FinishedRun:
     digests : size and SHA-256 of each of its files
     numerics : prints of the arithmetic that computed it, the first chunk's first; one where all bits are comparable
     provenance : of the start; no result depends on it
+    content : hash of all values, which unlike the digests does not change with the libraries that write files
     """
 
     path: Path
@@ -44,6 +45,7 @@ class FinishedRun:
     digests: Mapping[str, Mapping[str, Any]]
     numerics: tuple[str, ...]
     provenance: Mapping[str, Any]
+    content: str
 
     @property
     def command(self) -> str:
@@ -106,6 +108,7 @@ def read_run(path: Path) -> FinishedRun:
         end.digests,
         tuple(dict.fromkeys(e["print"] for e in Manifest(path / "manifest").read() if e["event"] in _PRINTS)),
         start.provenance,
+        end.content,
     )
 
 
@@ -129,6 +132,7 @@ class _End:
     claims: tuple[Claim, ...]
     failures: tuple[Failure, ...]
     digests: Mapping[str, Mapping[str, Any]]
+    content: str
 
 
 def _end(document: Any) -> _End:
@@ -142,6 +146,7 @@ def _end(document: Any) -> _End:
         tuple(_claim(claim) for claim in document["claims"]),
         tuple(Failure(int(f["case"]), str(f["error"]), str(f["message"])) for f in document["failed_cases"]),
         files,
+        str(document["content"]),
     )
 
 

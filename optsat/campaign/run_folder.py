@@ -14,7 +14,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from optsat.campaign.chunk_file import ChunkError, Columns, read_chunk, write_chunk
 from optsat.campaign.folder_lock import locked
@@ -24,7 +24,14 @@ from optsat.errors import InputError
 from optsat.files import write_atomically
 
 COMPLETE = "complete.json"
+# result.nc is as large as the chunks, and a number as text takes twice its eight bytes
+_FINAL_FILES = 3
+_REPLACEABLE = {"optsat", "source"}
 _RUN, _CHUNKS, _QUARANTINE, _MANIFEST = "run.json", "chunks", "quarantine", "manifest"
+
+
+Changes: TypeAlias = dict[str, list[Any]]
+"""Fields of an identity that differ: what they were, and what they are now."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +74,15 @@ class RunFolder:
     def finished(self) -> frozenset[int]:
         """Chunks that are on the disk, whole."""
         return frozenset(self._finished)
+
+    def bytes_needed(self) -> int:
+        """Return about how many bytes the rest of the run takes: missing chunks, and the final files of all.
+
+        A guess from the chunks that are there; 0 where none is.
+        """
+        sizes = [self._file(chunk).stat().st_size for chunk in self._finished]
+        mean = sum(sizes) / len(sizes) if sizes else 0.0
+        return round(mean * (self.count - len(sizes) + _FINAL_FILES * self.count))
 
     def check_numerics(self, found: str, chunk: int) -> None:
         """Refuse results of another arithmetic than the first chunk's; a case that crashed has none.
@@ -140,12 +156,14 @@ def open_run(
     provenance: Mapping[str, Any],
     resume: bool = False,
     mixed_machines: bool = False,
+    accept_version: bool = False,
 ) -> Iterator[RunFolder]:
     """Make a run folder, or take up the one that is there, and hold its lock.
 
     choose_chunk_size : cases a chunk, asked for a new folder only; one that is there keeps its own
     resume : allow to go on with an unfinished run
     mixed_machines : take results of another arithmetic, and write down which
+    accept_version : go on with a run that another version of optsat or of the study's file began, and write that down
 
     Raises
     ------
@@ -159,33 +177,39 @@ def open_run(
         raise InputError(f"{path} holds other files and no run. Choose an empty or a new folder.")
     with locked(path):
         (path / _CHUNKS).mkdir(exist_ok=True)
+        accepted: Changes = {}
         if not (path / _RUN).exists():
-            chunk_size = choose_chunk_size()
-            document = {"run": identity.run, "chunk_size": chunk_size, "identity": dataclasses.asdict(identity)}
+            run, chunk_size = identity.run, choose_chunk_size()
+            document = {"run": run, "chunk_size": chunk_size, "identity": dataclasses.asdict(identity)}
             document["provenance"] = dict(provenance)
             write_atomically(path / _RUN, (json.dumps(document, indent=2) + "\n").encode())
             event = "started"
         else:
-            chunk_size = _checked(path, identity, resume)
+            run, chunk_size, accepted = _checked(path, identity, resume, accept_version)
             event = "resumed"
-        folder = RunFolder(path, identity.run, chunk_size, identity.cases, mixed_machines)
+        folder = RunFolder(path, run, chunk_size, identity.cases, mixed_machines)
+        if accepted:
+            folder.manifest.append("accepted", changed=accepted)
         folder.manifest.append(event, finished=len(folder.finished), **dict(provenance))
         yield folder
 
 
-def _checked(path: Path, identity: Identity, resume: bool) -> int:
-    """Return the chunk size of the run that is there, if it is this one."""
+def _checked(path: Path, identity: Identity, resume: bool, accept_version: bool) -> tuple[str, int, Changes]:
+    """Return the name and chunk size of the run that is there, if it is this one, and what was accepted as new."""
     try:
         document = json.loads((path / _RUN).read_text(encoding="utf-8"))
-        there, chunk_size = dict(document["identity"]), int(document["chunk_size"])
+        there, run, chunk_size = dict(document["identity"]), str(document["run"]), int(document["chunk_size"])
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path / _RUN} cannot be read ({error}). Choose another folder.") from None
     wanted = dataclasses.asdict(identity)
-    changed = [f"{name} {there.get(name)!r} -> {wanted[name]!r}" for name in wanted if there.get(name) != wanted[name]]
-    if changed:
+    changed = {name: [there.get(name), wanted[name]] for name in wanted if there.get(name) != wanted[name]}
+    only_versions = changed.keys() <= _REPLACEABLE
+    if changed and not (accept_version and only_versions):
+        listed = "; ".join(f"{name} {old!r} -> {new!r}" for name, (old, new) in changed.items())
+        advice = ", or take the rest from this version with --accept-version" if only_versions else ""
         raise InputError(
-            f"{path} holds another run; what differs (there -> now): {'; '.join(changed)}. Choose another folder."
+            f"{path} holds another run; what differs (there -> now): {listed}. Choose another folder{advice}."
         )
     if not resume and not (path / COMPLETE).exists():
         raise InputError(f"{path} holds an unfinished run of this study. Add --resume to go on with it.")
-    return chunk_size
+    return run, chunk_size, changed

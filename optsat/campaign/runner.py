@@ -13,6 +13,7 @@ from pathlib import Path
 from optsat._version import __version__
 from optsat.campaign.case_runs import run_cases
 from optsat.campaign.designs import Layout
+from optsat.campaign.disk import disk_faults
 from optsat.campaign.executors import Chunk, Executor, Outcomes, Processes, Serial, Task
 from optsat.campaign.numerics import numerics_print
 from optsat.campaign.provenance import provenance
@@ -23,6 +24,7 @@ from optsat.campaign.seeds import campaign_key
 from optsat.campaign.store import check_finished, finish
 from optsat.campaign.study import Study
 from optsat.campaign.table import Table
+from optsat.campaign.termination import terminated_as_interrupted
 from optsat.errors import InputError
 
 _CHUNK_S = 2.0
@@ -46,6 +48,7 @@ def run_study(
     resume: bool = False,
     executor: Executor | None = None,
     mixed_machines: bool = False,
+    accept_version: bool = False,
 ) -> StudyResult:
     """Return the result of a study over its first `cases` cases.
 
@@ -57,11 +60,14 @@ def run_study(
     resume : go on with an unfinished run in `out`
     executor : where the chunks are run; `workers` processes of this machine unless given
     mixed_machines : take results of machines with another arithmetic into one run; the manifest says which
+    accept_version : go on with a run that another version of optsat or of the study's file began; the manifest says so
 
     Raises
     ------
     InputError : `cases` or `workers` below 1, `seed` negative, a study that workers cannot import, or a folder that
         cannot be used.
+    OptsatError : the disk is full; every finished chunk is kept.
+    KeyboardInterrupt : Ctrl-C or SIGTERM; every finished chunk is kept.
     """
     count = study.default_cases if cases is None else cases
     if count < 1 or workers < 1 or seed < 0:
@@ -81,7 +87,13 @@ def run_study(
         return _judged(study, seed, count, read_cases(study.name, tables.__getitem__, len(chunks)))
     identity = Identity(study.name, study.version, seed, count, __version__, _source_hash(study))
     size = functools.partial(_chunk_size, study, layout, workers)
-    with open_run(out, identity, size, provenance(sys.argv), resume, mixed_machines) as folder:
+    opened: list[RunFolder] = []
+    with (
+        terminated_as_interrupted(),
+        disk_faults(out, lambda: opened[0].bytes_needed() if opened else 0),
+        open_run(out, identity, size, provenance(sys.argv), resume, mixed_machines, accept_version) as folder,
+    ):
+        opened.append(folder)
         return _run_in_folder(study, seed, count, executor, task, folder, progress)
 
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from operator import index
+from typing import Any
 
 import numpy as np
 from numpy.random.bit_generator import ISeedSequence
@@ -32,7 +33,9 @@ def case_generator(key: int, cell: int, stream: int = 0) -> np.random.Generator:
         raise InputError(f"`cell` and `stream` must be >= 0, got {cell} and {stream}.")
     words = np.array([key, cell], dtype=np.uint64)
     counter = np.array([0, 0, stream, 0], dtype=np.uint64)
-    return np.random.Generator(np.random.Philox(_Key(words), counter=counter))
+    # NumPy documents that any ISeedSequence will do; its annotations do not
+    source: Any = _Key(words)
+    return np.random.Generator(np.random.Philox(source, counter=counter))
 
 
 class _Key(ISeedSequence):

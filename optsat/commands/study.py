@@ -47,6 +47,9 @@ def run_command(
         typer.Option(metavar="DIR", help="Folder that keeps every finished chunk and the result.", show_default=False),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the unfinished run in --out.")] = False,
+    accept_version: Annotated[
+        bool, typer.Option("--accept-version", help="Go on with a run that another version of optsat began.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a study and judge its claims. Exit code 1 when a case failed or a bar of our own fails."""
@@ -57,7 +60,7 @@ def run_command(
     study = load_study(name)
     with progress_bar(study.name) as report:
         executor = None if scheduler is None else Dask(scheduler)
-        result = run_study(study, cases, seed, workers, report, out, resume, executor, mixed_machines)
+        result = run_study(study, cases, seed, workers, report, out, resume, executor, mixed_machines, accept_version)
     if out is not None:
         note(f"Written to {out}.")
     if as_json:

@@ -49,6 +49,9 @@ def _document(runs: "tuple[FinishedRun, FinishedRun]", found: "Comparison") -> d
         "b": str(runs[1].path),
         "study": runs[0].identity.study,
         "same_bits": dict(found.same_bits),
+        "same_content": found.same_content,
+        "mixed_machines": list(found.mixed),
+        "same_arithmetic": found.same_arithmetic,
         "identity": {name: list(values) for name, values in found.changed.items()},
         "paired": not found.pairing,
         "identical_columns": list(found.identical),
@@ -93,8 +96,15 @@ def _words(runs: "tuple[FinishedRun, FinishedRun]", found: "Comparison") -> "lis
             ]
         )
     ]
+    lines += [
+        f"Mixed machines computed {name}: its last bits are not those of any one machine." for name in found.mixed
+    ]
     if all(found.same_bits.values()):
         return [*lines, f"The same bits: {', '.join(found.same_bits)}. There is nothing to compare."]
+    if found.same_content:
+        lines.append("The same values to the bit in every case; only the files were written by other versions.")
+    elif not found.same_arithmetic and not found.mixed:
+        lines.append("A and B were computed with other last bits (processor, libraries or threads): compare figures.")
     different = [name for name, same in found.same_bits.items() if not same]
     lines.append(f"Not the same bits: {', '.join(different)} differ{'s' if len(different) == 1 else ''}.")
     lines += [f"  {name}: {one} -> {other}" for name, (one, other) in found.changed.items()]

@@ -169,6 +169,24 @@ def test_another_run_is_refused_and_says_what_differs(unfinished: Path, monkeypa
         run(unfinished, resume=True)
 
 
+def test_another_version_goes_on_where_that_is_accepted(
+    unfinished: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: dict[str, bytes]
+) -> None:
+    monkeypatch.setattr(runner, "__version__", "9.9")
+    monkeypatch.setattr(runner, "_source_hash", lambda _study: "other")
+    with pytest.raises(InputError, match=r"optsat '.*' -> '9.9'; source .* -> 'other'.* --accept-version"):
+        run(unfinished, resume=True)
+    with pytest.raises(InputError, match=r"seed 3 -> 4; optsat .*Choose another folder\.$"):
+        run(unfinished, resume=True, seed=4, accept_version=True)
+    first = (unfinished / "chunks" / "000000").stat().st_mtime_ns
+    run(unfinished, resume=True, accept_version=True)
+    assert (unfinished / "chunks" / "000000").stat().st_mtime_ns == first
+    assert final_bytes(unfinished) == undisturbed
+    (accepted,) = [e for e in Manifest(unfinished / "manifest").read() if e["event"] == "accepted"]
+    assert accepted["changed"]["optsat"][1] == "9.9"
+    assert accepted["changed"]["source"][1] == "other"
+
+
 def test_other_files_are_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(InputError, match="other files and no run"):

@@ -10,11 +10,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import slow_study
 
+from optsat.campaign.manifest import Manifest
 from optsat.campaign.runner import run_study
 
 SCALE = float(os.environ.get("OPTSAT_KILLS", "1"))
@@ -23,6 +25,7 @@ CASES = 600 if SCALE == 1 else 2000
 PROGRAM = """
 import sys
 from pathlib import Path
+from typing import Any
 from optsat.campaign import runner
 import slow_study
 runner._chunk_size = lambda *_: 20
@@ -51,7 +54,7 @@ def chunks(folder: Path) -> set[str]:
     return {file.name for file in folder.glob("chunks/[0-9]*")}
 
 
-def wait_for_a_new_chunk(process: "subprocess.Popen[bytes]", folder: Path, before: set[str]) -> None:
+def wait_for_a_new_chunk(process: "subprocess.Popen[Any]", folder: Path, before: set[str]) -> None:
     while process.poll() is None and chunks(folder) == before:
         time.sleep(0.005)
 
@@ -89,6 +92,12 @@ def test_kills_of_the_runner(tmp_path: Path, kills: int, workers: int, whole_gro
         done += campaign_of_kills(folder, kills - done, workers, whole_group)
         campaign += 1
         assert (folder / "result.nc").read_bytes() == undisturbed
+        assert_none_was_computed_twice(folder)
+
+
+def assert_none_was_computed_twice(folder: Path) -> None:
+    stored = [event["chunk"] for event in Manifest(folder / "manifest").read() if event["event"] == "chunk"]
+    assert len(set(stored)) == len(stored)
 
 
 def test_kills_of_workers(tmp_path: Path, undisturbed: bytes) -> None:
@@ -105,6 +114,7 @@ def test_kills_of_workers(tmp_path: Path, undisturbed: bytes) -> None:
     assert process.wait() == 0
     assert done > 0
     assert (tmp_path / "result.nc").read_bytes() == undisturbed
+    assert_none_was_computed_twice(tmp_path)
 
 
 def workers_of(runner: int) -> list[int]:

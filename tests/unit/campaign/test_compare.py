@@ -16,6 +16,7 @@ from optsat.campaign.finished_run import FinishedRun, read_run
 from optsat.campaign.runner import run_study
 from optsat.campaign.study import Case, Row, Study
 from optsat.cli import app
+from optsat.commands.study_compare import _words
 from optsat.errors import InputError
 
 
@@ -80,6 +81,25 @@ def test_the_same_run_is_the_same_bits(tmp_path: Path) -> None:
     assert found.effects == ()
     assert found.identical == ("group", "angle", "good", "word", "nothing")
     assert found.arrays == {"path": 0.0}
+
+
+def test_the_same_values_in_files_of_other_versions(tmp_path: Path) -> None:
+    a, b = _run(tmp_path / "a", 0.0), _run(tmp_path / "b", 0.0)
+    resealed = dataclasses.replace(b, digests={**b.digests, "result.nc": {"bytes": 1, "sha256": "0"}})
+    found = compare_runs(a, resealed)
+    assert found.same_bits == {"result.nc": False, "summary.csv": True}
+    assert found.same_content
+    assert "The same values to the bit in every case" in "\n".join(_words((a, resealed), found))
+
+
+def test_mixed_machines_and_other_arithmetic_are_said(pair: tuple[FinishedRun, FinishedRun]) -> None:
+    a, b = pair
+    found = compare_runs(a, dataclasses.replace(b, numerics=(*b.numerics, "f" * 16)))
+    assert (found.mixed, found.same_arithmetic, found.same_content) == (("B",), False, False)
+    assert "Mixed machines computed B" in "\n".join(_words(pair, found))
+    found = compare_runs(a, dataclasses.replace(b, numerics=("f" * 16,)))
+    assert (found.mixed, found.same_arithmetic) == ((), False)
+    assert "A and B were computed with other last bits" in "\n".join(_words(pair, found))
 
 
 def test_pairs_find_what_samples_do_not(pair: tuple[FinishedRun, FinishedRun], tmp_path: Path) -> None:

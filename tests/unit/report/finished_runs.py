@@ -84,4 +84,4 @@ def large(cases: int, columns: int = 5) -> FinishedRun:
     table["word"] = np.array(["good", "bad"])[generator.integers(2, size=cases)]
     identity = Identity("large", 1, 0, cases, "0.1.0", "0" * 64)
     claim = Claim("mean", "mean", 0.0, 0.0, Verdict.REPRODUCED)
-    return FinishedRun(Path("large"), identity, "Large", {"mean": 0.0}, (claim,), (), table, {}, ("0" * 16,), {})
+    return FinishedRun(Path("large"), identity, "Large", {"mean": 0.0}, (claim,), (), table, {}, ("0" * 16,), {}, "0")

@@ -36,6 +36,7 @@ _MOST_CASES_A_CHUNK = 4096
 _LEAST_CHUNKS_A_WORKER = 4
 
 Progress = Callable[[int, int], None]
+Watch = Callable[[Table], None]
 
 
 def run_study(
@@ -49,6 +50,7 @@ def run_study(
     executor: Executor | None = None,
     mixed_machines: bool = False,
     accept_version: bool = False,
+    watch: Watch | None = None,
 ) -> StudyResult:
     """Return the result of a study over its first `cases` cases.
 
@@ -61,6 +63,7 @@ def run_study(
     executor : where the chunks are run; `workers` processes of this machine unless given
     mixed_machines : take results of machines with another arithmetic into one run; the manifest says which
     accept_version : go on with a run that another version of optsat or of the study's file began; the manifest says so
+    watch : gets the cases of every chunk as it finishes, in any order, for running figures
 
     Raises
     ------
@@ -77,16 +80,17 @@ def run_study(
         )
     layout = Layout.of(study.name, study.cases, count, campaign_key(study.name, seed))
     if executor is None:
-        executor = Processes(workers) if workers > 1 else Serial()
+        executor = Processes(min(workers, count)) if min(workers, count) > 1 else Serial()
     task = _task(study, layout, seed, executor)
+    size = functools.partial(_chunk_size, study, layout, workers)
     if out is None:
-        chunks = _chunks(count, max(1, min(64, count // (8 * workers))) if workers > 1 else 1)
+        plain = max(1, min(64, count // (8 * workers))) if workers > 1 else 1
+        chunks = _chunks(count, plain if study.run_batch is None else size())
         tables: dict[int, Table] = {}
-        for chunk, outcomes in _reported(executor.run(task, chunks), progress, count, 0):
+        for chunk, outcomes in _reported(executor.run(task, chunks), progress, watch, count, 0):
             tables[chunk.index] = outcomes.table
         return _judged(study, seed, count, read_cases(study.name, tables.__getitem__, len(chunks)))
     identity = Identity(study.name, study.version, seed, count, __version__, _source_hash(study))
-    size = functools.partial(_chunk_size, study, layout, workers)
     opened: list[RunFolder] = []
     with (
         terminated_as_interrupted(),
@@ -94,11 +98,18 @@ def run_study(
         open_run(out, identity, size, provenance(sys.argv), resume, mixed_machines, accept_version) as folder,
     ):
         opened.append(folder)
-        return _run_in_folder(study, seed, count, executor, task, folder, progress)
+        return _run_in_folder(study, seed, count, executor, task, folder, progress, watch)
 
 
 def _run_in_folder(
-    study: Study, seed: int, count: int, executor: Executor, task: Task, folder: RunFolder, progress: Progress | None
+    study: Study,
+    seed: int,
+    count: int,
+    executor: Executor,
+    task: Task,
+    folder: RunFolder,
+    progress: Progress | None,
+    watch: Watch | None,
 ) -> StudyResult:
     def cases() -> Cases:
         return read_cases(study.name, lambda chunk: Table.from_arrays(folder.load(chunk)), folder.count)
@@ -110,7 +121,7 @@ def _run_in_folder(
     missing = [chunk for chunk in chunks if chunk.index not in folder.finished]
     done = count - sum(len(chunk.numbers) for chunk in missing)
     try:
-        for chunk, outcomes in _reported(executor.run(task, missing), progress, count, done):
+        for chunk, outcomes in _reported(executor.run(task, missing), progress, watch, count, done):
             folder.check_numerics(outcomes.numerics, chunk.index)
             folder.store(chunk.index, outcomes.table.to_arrays())
     except KeyboardInterrupt:
@@ -123,12 +134,14 @@ def _run_in_folder(
 
 
 def _reported(
-    finished: Iterator[tuple[Chunk, Outcomes]], progress: Progress | None, count: int, done: int
+    finished: Iterator[tuple[Chunk, Outcomes]], progress: Progress | None, watch: Watch | None, count: int, done: int
 ) -> Iterator[tuple[Chunk, Outcomes]]:
     with contextlib.closing(finished):  # type: ignore[type-var]
         for chunk, outcomes in finished:
             yield chunk, outcomes
             done += len(chunk.numbers)
+            if watch is not None:
+                watch(outcomes.table)
             if progress is not None:
                 progress(done, count)
 

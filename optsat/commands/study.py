@@ -1,11 +1,13 @@
 """`optsat study`: list the studies, run one."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optsat.commands.output import AsJson, aligned, note, print_json, progress_bar
+from optsat.commands.campaign_progress import campaign_progress
+from optsat.commands.output import AsJson, aligned, note, print_json
 
 if TYPE_CHECKING:
     from optsat.campaign.result import StudyResult
@@ -34,7 +36,14 @@ def run_command(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A name of `optsat study list`.", show_default=False)],
     cases: Annotated[int | None, typer.Option(min=1, help="Number of cases; the study's own when absent.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the campaign.")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="Worker processes; the rows are the same for any number.")] = 1,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Worker processes; the result is the same for any number. All cores when absent, one for `-timing`.",
+            show_default=False,
+        ),
+    ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(metavar="tcp://HOST:PORT", help="Run on the Dask cluster at this address.", show_default=False),
@@ -50,6 +59,9 @@ def run_command(
     accept_version: Annotated[
         bool, typer.Option("--accept-version", help="Go on with a run that another version of optsat began.")
     ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="A line every 30 s where standard error is no terminal.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a study and judge its claims. Exit code 1 when a case failed or a bar of our own fails."""
@@ -58,9 +70,20 @@ def run_command(
     from optsat.campaign.runner import run_study
 
     study = load_study(name)
-    with progress_bar(study.name) as report:
-        executor = None if scheduler is None else Dask(scheduler)
-        result = run_study(study, cases, seed, workers, report, out, resume, executor, mixed_machines, accept_version)
+    with campaign_progress(study.name, verbose) as progress:
+        result = run_study(
+            study,
+            cases,
+            seed,
+            _workers(study.name) if workers is None else workers,
+            progress.report,
+            out,
+            resume,
+            None if scheduler is None else Dask(scheduler),
+            mixed_machines,
+            accept_version,
+            progress.watch,
+        )
     if out is not None:
         note(f"Written to {out}.")
     if as_json:
@@ -69,6 +92,11 @@ def run_command(
         typer.echo(f"{study.title}\n{in_words(result)}")
     if not result.passed:
         raise typer.Exit(1)
+
+
+def _workers(study: str) -> int:
+    """Return all cores; one where times are measured, for two measurements at once disturb each other."""
+    return 1 if study.endswith("-timing") else os.cpu_count() or 1
 
 
 def in_words(result: "StudyResult") -> str:

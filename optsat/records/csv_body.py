@@ -1,12 +1,11 @@
 """From the columns of a CSV log to SI measurements in B and N; a faulty cell takes out its own measurement only."""
 
-from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optsat.arrays import Array
+from optsat.records.csv_gate import Gate, in_time_order
 from optsat.records.csv_layout import Layout, SensorLayout
 from optsat.records.csv_table import Table
 from optsat.records.record import BadRow, Mask, VectorChannel
@@ -30,78 +29,17 @@ class Body:
 def read_body(file: str, layout: Layout, table: Table) -> tuple[Body, list[BadRow]]:
     """Return the measurements, and the rows and cells that were refused."""
     bad: list[BadRow] = []
-    table, t = _in_time_order(_Gate(file, layout.names, table, bad), layout)
-    channels = tuple(_channel(_Gate(file, layout.names, table, bad), vector) for vector in layout.vectors)
+    table, t = in_time_order(Gate(file, layout.names, table, bad), layout.time, layout.time_factor)
+    channels = tuple(_channel(Gate(file, layout.names, table, bad), vector) for vector in layout.vectors)
     rate = bound = truth = None
     if layout.gyro is not None:
-        rate, bound = _gyro(_Gate(file, layout.names, table, bad), layout.gyro)
+        rate, bound = _gyro(Gate(file, layout.names, table, bad), layout.gyro)
     if layout.truth:
-        truth = _truth(_Gate(file, layout.names, table, bad), layout.truth)
+        truth = _truth(Gate(file, layout.names, table, bad), layout.truth)
     return Body(t, channels, rate, bound, truth), bad
 
 
-class _Gate:
-    """The rows in which one measurement is still sound; each refusal is noted once, with its first reason."""
-
-    def __init__(self, file: str, names: list[str], table: Table, bad: list[BadRow]) -> None:
-        self.file, self.names, self.table, self.bad = file, names, table, bad
-        self.sound: Mask = np.ones(len(table.lines), dtype=bool)
-
-    def refuse(self, rows: Mask, column: int, reason: str, values: Array | None = None) -> None:
-        """Note each newly unsound row; `reason` may hold {text}, the cell as written, and {value}, from `values`."""
-        for i in map(int, np.flatnonzero(rows & self.sound)):
-            text = self.table.texts[i][column].strip()
-            said = reason.format(text=repr(text), value=np.nan if values is None else float(values[i]))
-            self.bad.append(BadRow(self.file, int(self.table.lines[i]), self.names[column], said))
-        self.sound &= ~rows
-
-    def refuse_unfit(self, present: Mask, columns: list[int]) -> None:
-        """Refuse cells that are no numbers, and empty ones where the measurement is present."""
-        for j in columns:
-            self.refuse(self.table.broken[:, j], j, "{text} is not a finite number")
-        for j in columns:
-            self.refuse(present & self.table.empty[:, j], j, "the cell is empty, but its measurement is not")
-
-    def filled(self, columns: list[int]) -> Mask:
-        """Return the rows in which any of these cells holds something."""
-        return np.asarray(~self.table.empty[:, columns].all(axis=1))
-
-
-def _in_time_order(gate: _Gate, layout: Layout) -> tuple[Table, Array]:
-    column = layout.time
-    t = gate.table.values[:, column] * layout.time_factor
-    gate.refuse_unfit(np.ones(len(t), dtype=bool), [column])
-    rows = np.flatnonzero(gate.sound)
-    rows = rows[_longest_increasing(t[rows])]
-    late = np.ones(len(t), dtype=bool)
-    late[rows] = False
-    gate.refuse(late, column, "the time {text} is repeated or out of order")
-    return gate.table.select(rows), t[rows]
-
-
-def _longest_increasing(t: Array) -> NDArray[np.int64]:
-    """Return the indices of the longest strictly increasing part of `t`, the earlier row where there is a choice.
-
-    One row whose clock jumped ahead must not cost all rows after it, so comparing neighbours is not enough.
-    """
-    if np.all(np.diff(t) > 0):
-        return np.arange(len(t))
-    # patience sorting, run backwards: ties and steps back then keep the row that stands first in the file
-    tails: list[float] = []
-    heads: list[int] = []
-    following = np.full(len(t), -1)
-    for i in range(len(t) - 1, -1, -1):
-        place = bisect_left(tails, -t[i])
-        following[i] = heads[place - 1] if place else -1
-        tails[place : place + 1] = [-float(t[i])]
-        heads[place : place + 1] = [i]
-    chain = [heads[-1]]
-    while following[chain[-1]] >= 0:
-        chain.append(int(following[chain[-1]]))
-    return np.array(chain)
-
-
-def _channel(gate: _Gate, vector: SensorLayout) -> VectorChannel:
+def _channel(gate: Gate, vector: SensorLayout) -> VectorChannel:
     values = gate.table.values
     present = gate.filled(vector.measured)
     gate.refuse_unfit(present, vector.columns)
@@ -120,7 +58,7 @@ def _channel(gate: _Gate, vector: SensorLayout) -> VectorChannel:
     return VectorChannel(vector.name, vector.mounting.frame, b_B, r_N, bound, valid)
 
 
-def _gyro(gate: _Gate, gyro: SensorLayout) -> tuple[Array, Array | None]:
+def _gyro(gate: Gate, gyro: SensorLayout) -> tuple[Array, Array | None]:
     rate = gate.table.values[:, gyro.measured] * gyro.factor
     present = gate.filled(gyro.measured)
     gate.refuse_unfit(present, gyro.columns)
@@ -137,7 +75,7 @@ def _gyro(gate: _Gate, gyro: SensorLayout) -> tuple[Array, Array | None]:
     return rate, None if gyro.bound is None and gyro.mounting.bound is None else bound
 
 
-def _truth(gate: _Gate, columns: list[int]) -> Array:
+def _truth(gate: Gate, columns: list[int]) -> Array:
     q = gate.table.values[:, columns]
     present = gate.filled(columns)
     gate.refuse_unfit(present, columns)
@@ -148,7 +86,7 @@ def _truth(gate: _Gate, columns: list[int]) -> Array:
     return _directions(q, present & gate.sound)
 
 
-def _bound(gate: _Gate, sensor: SensorLayout) -> Array:
+def _bound(gate: Gate, sensor: SensorLayout) -> Array:
     if sensor.bound is None:
         constant = np.nan if sensor.mounting.bound is None else sensor.mounting.bound
         return np.full(len(gate.table.lines), constant)

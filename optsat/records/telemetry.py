@@ -51,7 +51,7 @@ class Telemetry:
         if t.ndim != 1 or len(t) == 0:
             raise InputError(f"`t` must be (T,) times [s] with at least one epoch, got shape {t.shape}.")
         _refuse(~np.isfinite(t), "t", t, "a finite time [s]")
-        _refuse(np.r_[False, np.diff(t) <= 0], "t", t, "later than the row before [s]")
+        _refuse(np.concatenate(([False], np.diff(t) <= 0)), "t", t, "later than the row before [s]")
         _freeze(self, "t", t)
         for name, (width, unit) in CHANNELS.items():
             value = getattr(self, name)
@@ -67,7 +67,7 @@ class Telemetry:
                     f"`{name}` must have shape {shape} [{unit}], one row per epoch; got {array.shape}.{hint}"
                 )
             _freeze(self, name, array)
-        unsound = ~np.isfinite(self.command_torque_B).all(axis=1)
+        unsound = np.asarray(~np.isfinite(self.command_torque_B).all(axis=1))
         _refuse(unsound, "command_torque_B", self.command_torque_B, "finite [N m]; a log without commands has zeros")
 
     def __len__(self) -> int:

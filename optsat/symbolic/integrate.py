@@ -1,4 +1,4 @@
-"""Integrate: fixed-step Runge-Kutta of order four as a function of the state."""
+"""Integrate: one fixed step as a function of the state, by Runge-Kutta of order four or by Euler."""
 
 from collections.abc import Sequence
 from typing import TypeAlias
@@ -9,6 +9,8 @@ from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate, port_named
 
 Point: TypeAlias = dict[str, Value]
+
+_DT = Port("dt", (), "s", lower=0.0)
 
 
 def rk4_step(
@@ -31,12 +33,9 @@ def rk4_step(
     """
     import casadi as ca
 
-    ports = [port_named(derivative.inputs, name, derivative.name) for name in states]
+    ports = _state_ports(derivative, states, unit_length)
     if time is not None:
         port_named(derivative.inputs, time, derivative.name)
-    _check_rates(derivative, ports)
-    if missing := set(unit_length) - set(states):
-        raise InputError(f"{derivative.name}: `unit_length` names `{min(missing)}`, which is no state.")
     if substeps < 1:
         raise InputError(f"`substeps` must be at least 1, got {substeps}.")
     symbols = dict(zip((port.name for port in derivative.inputs), derivative.symbols(), strict=True))
@@ -63,9 +62,45 @@ def rk4_step(
         current[name] = current[name] / ca.norm_2(current[name])
     return generate(
         f"{derivative.name}_step",
-        inputs=[*((port, symbols[port.name]) for port in derivative.inputs), (Port("dt", (), "s", lower=0.0), dt)],
+        inputs=[*((port, symbols[port.name]) for port in derivative.inputs), (_DT, dt)],
         outputs=[(port, current[port.name]) for port in ports],
     )
+
+
+def euler_step(
+    derivative: GeneratedFunction, states: Sequence[str], unit_length: Sequence[str] = ()
+) -> GeneratedFunction:
+    """Return state + dt rate as a function of the inputs of `derivative` and `dt` [s]; order one, for comparison.
+
+    states : inputs that are states; output k of `derivative` is the rate of states[k]
+    unit_length : states scaled back to length one after the step, such as a quaternion
+
+    Raises
+    ------
+    InputError : as for `rk4_step`.
+    """
+    import casadi as ca
+
+    ports = _state_ports(derivative, states, unit_length)
+    symbols = dict(zip((port.name for port in derivative.inputs), derivative.symbols(), strict=True))
+    dt = ca.SX.sym("dt")
+    rates = derivative.casadi.call(list(symbols.values()))
+    after = {name: symbols[name] + dt * rate for name, rate in zip(states, rates, strict=True)}
+    for name in unit_length:
+        after[name] = after[name] / ca.norm_2(after[name])
+    return generate(
+        f"{derivative.name}_euler_step",
+        inputs=[*((port, symbols[port.name]) for port in derivative.inputs), (_DT, dt)],
+        outputs=[(port, after[port.name]) for port in ports],
+    )
+
+
+def _state_ports(derivative: GeneratedFunction, states: Sequence[str], unit_length: Sequence[str]) -> list[Port]:
+    ports = [port_named(derivative.inputs, name, derivative.name) for name in states]
+    _check_rates(derivative, ports)
+    if missing := set(unit_length) - set(states):
+        raise InputError(f"{derivative.name}: `unit_length` names `{min(missing)}`, which is no state.")
+    return ports
 
 
 def _check_rates(derivative: GeneratedFunction, states: list[Port]) -> None:

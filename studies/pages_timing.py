@@ -79,8 +79,9 @@ def browser(profile: Path) -> Iterator[Any]:
     MissingExtraError : a part of it is absent.
     """
     missing = [name for name in ("chromium", "chromedriver") if shutil.which(name) is None]
+    webdriver: Any = None
     try:
-        webdriver: Any = importlib.import_module("selenium.webdriver")
+        webdriver = importlib.import_module("selenium.webdriver")
     except ImportError:
         missing.append("selenium")
     if missing:

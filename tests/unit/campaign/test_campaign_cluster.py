@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import batch_study
 import pytest
 import slow_study
 
@@ -92,6 +93,18 @@ def test_a_cluster_gives_the_same_bytes(cluster: str, tmp_path: Path) -> None:
     result = run_study(slow_study.study, cases=CASES, out=tmp_path / "dask", executor=Dask(cluster))
     assert result.passed
     assert _bytes(tmp_path / "dask") == _bytes(tmp_path / "serial")
+
+
+def test_a_cluster_gives_the_same_bytes_of_batches(
+    cluster: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Chunks of seven on two workers of the cluster, in two processes, and one chunk here."""
+    run_study(batch_study.study, out=tmp_path / "dask", executor=Dask(cluster))
+    run_study(batch_study.study, out=tmp_path / "processes", workers=2)
+    monkeypatch.setattr(runner, "_chunk_size", lambda *_arguments: 60)
+    run_study(batch_study.study, out=tmp_path / "serial")
+    found = {(*_bytes(folder), (folder / "complete.json").read_bytes()) for folder in tmp_path.iterdir()}
+    assert len(found) == 1
 
 
 def test_without_a_cluster(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from optsat.errors import InputError
 if TYPE_CHECKING:
     import pint
 
-Kind = Literal["angle", "rate", "flux_density", "length", "time", "acceleration", "direction"]
+Kind = Literal["angle", "rate", "flux_density", "length", "time", "acceleration", "torque", "direction"]
 
 # kind: (its words, its SI unit, units worth offering in a message)
 _KINDS: dict[Kind, tuple[str, str, str]] = {
@@ -23,6 +23,7 @@ _KINDS: dict[Kind, tuple[str, str, str]] = {
     "length": ("a length", "m", "m, mm, km"),
     "time": ("a time", "s", "s, ms, us, min, hour"),
     "acceleration": ("an acceleration", "m/s^2", "m/s^2, g_0"),
+    "torque": ("a torque", "N m", "N m, mN m"),
     "direction": ("a bare direction", "dimensionless", "-"),
 }
 _PLAUSIBLE_LIMIT: dict[Kind, float] = {"angle": 2 * np.pi, "rate": 100.0}
@@ -83,7 +84,7 @@ def si_factor(unit: str, kind: Kind, name: str = "value") -> float:
 
 
 def to_si(value: ArrayLike, unit: str, kind: Kind, name: str = "value") -> Array:
-    """Return `value`, given in `unit`, in the SI unit of its kind: rad, rad/s, T, m, s, m/s^2 or a bare direction.
+    """Return `value`, given in `unit`, in the SI unit of its kind: rad, rad/s, T, m, s, m/s^2, N m or a bare direction.
 
     Raises
     ------

@@ -55,7 +55,7 @@ def _faulty(fault: Fault, t: Array, readings: Array, noise: Array, active: Windo
         case SensorFaultKind.DRIFT:
             return _shifted(fault.part, readings, value * np.maximum(t - fault.start_s, 0.0)[..., None])
         case SensorFaultKind.SCALE:
-            return readings * value
+            return np.asarray(readings * value)
         case SensorFaultKind.NOISE:
             return _shifted(fault.part, readings, value * noise[..., :3])
         case SensorFaultKind.DEAD_NOISY:

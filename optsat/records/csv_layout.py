@@ -15,6 +15,15 @@ VECTOR_KINDS: tuple[Kind, ...] = ("direction", "flux_density", "acceleration", "
 _HEADING = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]")
 _VECTOR_PART = re.compile(r"(?P<vector>[A-Za-z][A-Za-z0-9_-]*)\.(?:(?:measured|reference)\.[xyz]|bound)")
 _GYRO = ["gyro.x", "gyro.y", "gyro.z"]
+DEVICES: dict[str, tuple[tuple[str, ...], Kind]] = {
+    "command": (("x", "y", "z"), "torque"),
+    "star": (("x", "y", "z", "w"), "direction"),
+    "gps": (("x", "y", "z"), "length"),
+    "accelerometer": (("x", "y", "z"), "acceleration"),
+    "skewed_gyro": (("rate",), "rate"),
+    "pressure": (("x", "y", "z"), "torque"),
+}
+"""Of each device of telemetry but the gyro: its columns, and what they measure."""
 _TRUTH = ["truth.x", "truth.y", "truth.z", "truth.w"]
 
 
@@ -41,7 +50,10 @@ class SensorLayout:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything stands in a log."""
+    """Where everything stands in a log.
+
+    devices : of each device of telemetry in the log, its columns and their factor to SI
+    """
 
     metadata: Metadata
     header_line: int
@@ -52,6 +64,7 @@ class Layout:
     vectors: list[SensorLayout]
     gyro: SensorLayout | None
     truth: list[int]
+    devices: dict[str, tuple[list[int], float]]
 
 
 def parse_layout(file: str, lines: list[str]) -> Layout:
@@ -102,6 +115,7 @@ class _HeaderReader:
             vectors=[self.vector(name) for name in vectors],
             gyro=self.gyro(),
             truth=self.truth(),
+            devices=self.devices(),
         )
 
     def fail(self, message: str, column: str) -> RecordError:
@@ -124,6 +138,7 @@ class _HeaderReader:
         parts = {name: _VECTOR_PART.fullmatch(name) for name in self.numbers if name.split(".")[0] not in RESERVED}
         vectors = list(dict.fromkeys(part["vector"] for part in parts.values() if part))
         known = ["t", *_GYRO, "gyro.bound", *_TRUTH]
+        known += [f"{device}.{part}" for device, (parts, _) in DEVICES.items() for part in parts]
         for vector in vectors or ["NAME"]:
             known += [f"{vector}.{side}.{axis}" for side in ("measured", "reference") for axis in "xyz"]
             known.append(f"{vector}.bound")
@@ -189,3 +204,11 @@ class _HeaderReader:
         if not any(name.startswith("truth.") for name in self.numbers):
             return []
         return self.group(_TRUTH, ("direction",))[0]
+
+    def devices(self) -> dict[str, tuple[list[int], float]]:
+        found = {}
+        for device, (parts, kind) in DEVICES.items():
+            names = [f"{device}.{part}" for part in parts]
+            if any(name in self.numbers for name in names):
+                found[device] = self.group(names, (kind,))
+        return found

@@ -23,7 +23,8 @@ The head
   `NAME.reference.x|y|z` the same direction known in N;
   `NAME.bound` the largest angle between the two once the attitude is right, body and reference errors together;
   `gyro.x|y|z` rate of B relative to N, components in the gyro's frame; `gyro.bound` the largest length of its error;
-  `truth.x|y|z|w` the true attitude q_BN, scalar last.
+  `truth.x|y|z|w` the true attitude q_BN, scalar last;
+  the columns of telemetry, which are read by `optsat.records.telemetry_csv` and of no account here.
 - The components of a vector share one unit: none, a flux density, an acceleration or a length. Only the direction is
   used, so the length may be anything but zero.
 
@@ -59,7 +60,7 @@ def read_csv_log(path: str | os.PathLike[str], strict: bool = False) -> Record:
     RecordError : no such file, a fault of the head, no usable row; with `strict`, the first bad row.
     """
     file = os.fspath(path)
-    lines, terminated = _read_lines(file)
+    lines, terminated = read_lines(file)
     layout = parse_layout(file, lines)
     table, bad = read_table(file, lines, layout.header_line, layout.names, layout.delimiter, terminated=terminated)
     body, more = read_body(file, layout, table)
@@ -82,7 +83,7 @@ def read_csv_log(path: str | os.PathLike[str], strict: bool = False) -> Record:
     )
 
 
-def _read_lines(file: str) -> tuple[list[str], bool]:
+def read_lines(file: str) -> tuple[list[str], bool]:
     """Return the lines of a text file, and whether the last one ends with a line break."""
     try:
         with open(file, "rb") as stream:

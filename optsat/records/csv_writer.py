@@ -38,24 +38,25 @@ def write_csv_log(path: str | os.PathLike[str], record: Record, frames: Mapping[
     columns = _columns(record, rotations)
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(columns)
-    rows.writerows(zip(*(map(_cell, values.tolist()) for values in columns.values()), strict=True))
+    rows.writerows(zip(*(map(cell, values.tolist()) for values in columns.values()), strict=True))
     write_atomically(Path(path), text.getvalue().encode())
 
 
 def _metadata(record: Record, rotations: Mapping[str, Array]) -> list[str]:
     used = {channel.frame for channel in record.channels}
-    lines = [f"epoch = {_toml(record.epoch)}"] if record.epoch is not None else []
-    lines += [f"source = {_toml(record.source)}"]
+    lines = [f"epoch = {toml_text(record.epoch)}"] if record.epoch is not None else []
+    lines += [f"source = {toml_text(record.source)}"]
     for name, dcm_SB in rotations.items():
         if name in used:
             lines += [f"[frames.{name}]", f"dcm_SB = {dcm_SB.tolist()}"]
     for channel in record.channels:
         if channel.frame in rotations:
-            lines += [f"[vectors.{channel.name}]", f"frame = {_toml(channel.frame)}"]
+            lines += [f"[vectors.{channel.name}]", f"frame = {toml_text(channel.frame)}"]
     return lines
 
 
-def _toml(text: str) -> str:
+def toml_text(text: str) -> str:
+    """Return a text as TOML writes it."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -81,5 +82,6 @@ def _vector_columns(channel: VectorChannel, rotations: Mapping[str, Array]) -> d
     return columns | {f"{channel.name}.bound [rad]": channel.angle_bound_rad}
 
 
-def _cell(value: float) -> str:
+def cell(value: float) -> str:
+    """Return a number with all its digits; a missing one is an empty cell."""
     return repr(value) if math.isfinite(value) else ""

@@ -139,6 +139,8 @@ def figure(rows: Sequence[Row], path: Path) -> None:
         panel.axhline(1, color="#444444", linewidth=0.8)
         panel.set_title(says)
         panel.set_xlabel("worst-case loss over the q-method's")
+    axes[0].set_yticks([0.25, 0.5, 1, 2, 4], ["1/4", "1/2", "1", "2", "4"])
+    axes[0].set_yticks([], minor=True)
     axes[0].set_ylabel("attitude error over the q-method's")
     axes[0].legend(frameon=False, loc="lower left")
     write_svg(canvas, path)

@@ -1,13 +1,16 @@
-/* _binding: compiled kernels called on arrays through the buffer protocol, every argument checked first.
+/* _binding: compiled kernels called on NumPy's arrays, every argument checked first.
 
    A kernel is a capsule. What a call does not take as it is, lists or strided arrays or numbers that are not finite,
-   goes through a Python function that converts it or says what is wrong. Under the limited API one binary serves every
-   later Python. */
+   goes through a Python function that converts it or says what is wrong. Arrays are looked at and made through NumPy's
+   C API: the buffer protocol, which describes each array in words, takes longer than most kernels. Under Python's
+   limited API one binary serves every later Python, and compiled with the headers of NumPy 2 every NumPy from 1.26. */
 #ifndef Py_LIMITED_API
 #define Py_LIMITED_API 0x030B0000
 #endif
+#define NPY_NO_DEPRECATED_API NPY_1_22_API_VERSION
 #include <Python.h>
 #include <dlfcn.h>
+#include <numpy/ndarrayobject.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -27,8 +30,7 @@ typedef void (*tiles_t)(int64_t tiles, const void *const in[], const int64_t str
 typedef struct {
     Py_ssize_t size;
     int axes;
-    Py_ssize_t shape[MAX_AXES];
-    PyObject *how_to_allocate; /* of a result, the arguments of numpy.empty; of a scalar NULL */
+    npy_intp shape[MAX_AXES];
 } port_t;
 
 typedef struct {
@@ -39,9 +41,7 @@ typedef struct {
     int width;
     int inputs;
     int outputs;
-    PyObject *array_type;
-    PyObject *empty;
-    PyObject *scalar_type;
+    PyArray_Descr *real;
     PyObject *statuses; /* by value; None where the kernel has none */
     PyObject *convert;
     port_t port[MAX_PORTS];
@@ -57,14 +57,9 @@ static void kernel_free(PyObject *capsule)
     /* the library stays loaded: other capsules may point into it */
     kernel_t *kernel = kernel_of(capsule);
     if (kernel != NULL) {
-        Py_XDECREF(kernel->array_type);
-        Py_XDECREF(kernel->empty);
-        Py_XDECREF(kernel->scalar_type);
+        Py_XDECREF((PyObject *)kernel->real);
         Py_XDECREF(kernel->statuses);
         Py_XDECREF(kernel->convert);
-        for (int i = 0; i < kernel->inputs + kernel->outputs; ++i) {
-            Py_XDECREF(kernel->port[i].how_to_allocate);
-        }
         PyMem_Free(kernel);
     }
 }
@@ -117,33 +112,11 @@ static int all_finite(const void *memory, Py_ssize_t count, int is_float)
     return is_float ? all_finite_float(from, (size_t)count) : all_finite_double(from, (size_t)count);
 }
 
-/* Contiguous native reals, aligned; 0 without an exception where it is anything else. */
-static int hold(const kernel_t *kernel, PyObject *array, Py_buffer *view, int writable)
+/* Whether an array is contiguous, aligned and of the kernel's reals in the byte order of this machine. */
+static int is_ready(const kernel_t *kernel, PyArrayObject *array)
 {
-    const Py_ssize_t item = kernel->is_float ? 4 : 8;
-    if (PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (writable ? PyBUF_WRITABLE : 0)) != 0) {
-        PyErr_Clear();
-        return 0;
-    }
-    const char *format = view->format;
-    if (format != NULL && (format[0] == '@' || format[0] == '=')) {
-        ++format;
-    }
-    if (format == NULL || format[0] != (kernel->is_float ? 'f' : 'd') || format[1] != '\0' || view->itemsize != item
-        || ((uintptr_t)view->buf % (uintptr_t)item) != 0U) {
-        PyBuffer_Release(view);
-        return 0;
-    }
-    return 1;
-}
-
-static void release(Py_buffer *views, const int *held, int count)
-{
-    for (int i = 0; i < count; ++i) {
-        if (held[i]) {
-            PyBuffer_Release(&views[i]);
-        }
-    }
+    return PyArray_TYPE(array) == (kernel->is_float ? NPY_FLOAT : NPY_DOUBLE) && PyArray_ISNOTSWAPPED(array)
+        && PyArray_IS_C_CONTIGUOUS(array) && (uintptr_t)PyArray_DATA(array) % (kernel->is_float ? 4U : 8U) == 0U;
 }
 
 typedef union {
@@ -152,23 +125,21 @@ typedef union {
 } real_t;
 
 /* The address of one argument, or NULL where the call does not take it as it is. */
-static const void *argument(
-    const kernel_t *kernel, const port_t *port, PyObject *value, Py_buffer *view, int *held, real_t *scalar)
+static const void *argument(const kernel_t *kernel, const port_t *port, PyObject *value, real_t *scalar)
 {
-    if ((PyObject *)Py_TYPE(value) == kernel->array_type) {
-        if (!hold(kernel, value, view, 0)) {
-            return NULL;
-        }
-        *held = 1;
-        if (view->ndim != port->axes) {
+    /* of the exact type: a masked array would lose its mask */
+    if (PyArray_CheckExact(value)) {
+        PyArrayObject *array = (PyArrayObject *)value;
+        if (PyArray_NDIM(array) != port->axes || !is_ready(kernel, array)) {
             return NULL;
         }
         for (int axis = 0; axis < port->axes; ++axis) {
-            if (view->shape[axis] != port->shape[axis]) {
+            if (PyArray_DIM(array, axis) != port->shape[axis]) {
                 return NULL;
             }
         }
-        return all_finite(view->buf, port->size, kernel->is_float) ? view->buf : NULL;
+        const void *data = PyArray_DATA(array);
+        return all_finite(data, port->size, kernel->is_float) ? data : NULL;
     }
     if (port->axes != 0 || !PyFloat_Check(value)) {
         return NULL;
@@ -181,28 +152,13 @@ static const void *argument(
     return all_finite(scalar, 1, kernel->is_float) ? scalar : NULL;
 }
 
-static PyObject *scalar_result(const kernel_t *kernel, const real_t *value)
+static PyObject *fresh(const kernel_t *kernel, const port_t *port)
 {
-    PyObject *number = PyFloat_FromDouble(kernel->is_float ? (double)value->f : value->d);
-    PyObject *result = (number == NULL) ? NULL : PyObject_CallFunctionObjArgs(kernel->scalar_type, number, NULL);
-    Py_XDECREF(number);
-    return result;
+    Py_INCREF((PyObject *)kernel->real);
+    return PyArray_NewFromDescr(&PyArray_Type, kernel->real, port->axes, port->shape, NULL, NULL, 0, NULL);
 }
 
-static PyObject *allocated(const kernel_t *kernel, const port_t *port, Py_buffer *view, int *held)
-{
-    PyObject *array = PyObject_Call(kernel->empty, port->how_to_allocate, NULL);
-    if (array != NULL) {
-        *held = hold(kernel, array, view, 1);
-        if (!*held) {
-            PyErr_SetString(PyExc_SystemError, "numpy.empty returned an array of another kind");
-            Py_DECREF(array);
-            array = NULL;
-        }
-    }
-    return array;
-}
-
+/* The results, which it takes over, and after them the status; unpacked where that is one. */
 static PyObject *unpacked(const kernel_t *kernel, PyObject **results, int32_t status)
 {
     int count = kernel->outputs;
@@ -214,12 +170,16 @@ static PyObject *unpacked(const kernel_t *kernel, PyObject **results, int32_t st
         Py_INCREF(results[count]);
         ++count;
     }
+    PyObject *answer = NULL;
     if (count == 1) {
-        return Py_NewRef(results[0]);
+        answer = results[0];
+        results[0] = NULL;
+        return answer;
     }
-    PyObject *answer = PyTuple_New(count);
+    answer = PyTuple_New(count);
     for (int k = 0; answer != NULL && k < count; ++k) {
-        (void)PyTuple_SetItem(answer, k, Py_NewRef(results[k]));
+        (void)PyTuple_SetItem(answer, k, results[k]);
+        results[k] = NULL;
     }
     return answer;
 }
@@ -228,41 +188,35 @@ static PyObject *unpacked(const kernel_t *kernel, PyObject **results, int32_t st
    argument cannot be taken as it is. */
 static PyObject *attempt(const kernel_t *kernel, PyObject *const *args)
 {
-    Py_buffer views[MAX_PORTS];
     real_t scalars[MAX_PORTS];
     const void *in[MAX_PORTS];
     void *out[MAX_PORTS];
     PyObject *results[MAX_PORTS + 1];
-    int held[MAX_PORTS];
-    const int ports = kernel->inputs + kernel->outputs;
     PyObject *answer = NULL;
-    for (int i = 0; i < ports; ++i) {
-        held[i] = 0;
-        results[i] = NULL;
-    }
-    results[ports] = NULL;
-
     for (int i = 0; i < kernel->inputs; ++i) {
-        in[i] = argument(kernel, &kernel->port[i], args[i], &views[i], &held[i], &scalars[i]);
+        in[i] = argument(kernel, &kernel->port[i], args[i], &scalars[i]);
         if (in[i] == NULL) {
-            goto done;
+            return NULL;
         }
     }
+    for (int k = 0; k <= kernel->outputs; ++k) {
+        results[k] = NULL;
+    }
     for (int k = 0; k < kernel->outputs; ++k) {
-        const int i = kernel->inputs + k;
-        out[k] = &scalars[i];
-        if (kernel->port[i].axes != 0) {
-            results[k] = allocated(kernel, &kernel->port[i], &views[i], &held[i]);
+        const port_t *port = &kernel->port[kernel->inputs + k];
+        out[k] = &scalars[kernel->inputs + k];
+        if (port->axes != 0) {
+            results[k] = fresh(kernel, port);
             if (results[k] == NULL) {
                 goto done;
             }
-            out[k] = views[i].buf;
+            out[k] = PyArray_DATA((PyArrayObject *)results[k]);
         }
     }
     const int32_t status = kernel->call(in, out);
     for (int k = 0; k < kernel->outputs; ++k) {
         if (results[k] == NULL) {
-            results[k] = scalar_result(kernel, &scalars[kernel->inputs + k]);
+            results[k] = PyArray_Scalar(out[k], kernel->real, NULL);
             if (results[k] == NULL) {
                 goto done;
             }
@@ -270,7 +224,6 @@ static PyObject *attempt(const kernel_t *kernel, PyObject *const *args)
     }
     answer = unpacked(kernel, results, status);
 done:
-    release(views, held, ports);
     for (int k = 0; k <= kernel->outputs; ++k) {
         Py_XDECREF(results[k]);
     }
@@ -370,11 +323,14 @@ static void compute(const kernel_t *kernel, work_t *work, int in_tiles, int64_t 
     }
 }
 
-static int overlap(const Py_buffer *a, const Py_buffer *b)
+static int overlap(const char *a, const char *b, Py_ssize_t size_a, Py_ssize_t size_b)
 {
-    const char *start_a = (const char *)a->buf;
-    const char *start_b = (const char *)b->buf;
-    return a->len > 0 && b->len > 0 && start_a < start_b + b->len && start_b < start_a + a->len;
+    return size_a > 0 && size_b > 0 && a < b + size_b && b < a + size_a;
+}
+
+static const char *memory(const kernel_t *kernel, const work_t *work, int port)
+{
+    return (const char *)((port < kernel->inputs) ? work->in[port] : work->out[port - kernel->inputs]);
 }
 
 /* (in_tiles, begin, end, count, arrays, status): see `run` of the module. */
@@ -387,7 +343,8 @@ static PyObject *kernel_run(PyObject *self, PyObject *args)
     long long units = 0;
     PyObject *arrays = NULL;
     PyObject *status = NULL;
-    if (kernel == NULL || !PyArg_ParseTuple(args, "pLLLO!O", &in_tiles, &begin, &end, &units, &PyTuple_Type, &arrays, &status)) {
+    if (kernel == NULL
+        || !PyArg_ParseTuple(args, "pLLLO!O", &in_tiles, &begin, &end, &units, &PyTuple_Type, &arrays, &status)) {
         return NULL;
     }
     const int ports = kernel->inputs + kernel->outputs;
@@ -395,45 +352,44 @@ static PyObject *kernel_run(PyObject *self, PyObject *args)
         PyErr_SetString(PyExc_ValueError, "wrong number of arrays, a range beyond the samples, or no form in tiles");
         return NULL;
     }
-    Py_buffer views[MAX_PORTS + 1];
-    int held[MAX_PORTS + 1] = { 0 };
+    const Py_ssize_t item = kernel->is_float ? 4 : 8;
     work_t work = { .status = NULL };
-    PyObject *answer = NULL;
     for (int i = 0; i < ports; ++i) {
         const int is_result = i >= kernel->inputs;
         const Py_ssize_t unit = kernel->port[i].size * (in_tiles ? kernel->width : 1);
-        held[i] = hold(kernel, PyTuple_GetItem(arrays, i), &views[i], is_result);
-        const Py_ssize_t found = held[i] ? views[i].len / views[i].itemsize : -1;
+        PyArrayObject *array = (PyArrayObject *)PyTuple_GetItem(arrays, i);
+        const int ready = PyArray_Check((PyObject *)array) && is_ready(kernel, array)
+            && (!is_result || PyArray_ISWRITEABLE(array));
+        const Py_ssize_t found = ready ? PyArray_SIZE(array) : -1;
         const int is_shared = !is_result && found == unit;
-        if (!held[i] || !(is_shared || found == unit * (Py_ssize_t)units)) {
+        if (!ready || !(is_shared || found == unit * (Py_ssize_t)units)) {
             PyErr_Format(PyExc_ValueError, "array %d is not contiguous, of the kernel's reals and of its length", i);
-            goto done;
+            return NULL;
         }
         work.stride[i] = (is_shared && units != 1) ? 0 : unit;
         work.length[i] = found;
         if (is_result) {
-            work.out[i - kernel->inputs] = views[i].buf;
+            work.out[i - kernel->inputs] = PyArray_DATA(array);
         } else {
-            work.in[i] = views[i].buf;
+            work.in[i] = PyArray_DATA(array);
         }
         for (int j = 0; is_result && j < i; ++j) {
-            if (overlap(&views[i], &views[j])) {
+            if (overlap(memory(kernel, &work, i), memory(kernel, &work, j), found * item, work.length[j] * item)) {
                 PyErr_Format(PyExc_ValueError, "arrays %d and %d share memory; a result must have its own", j, i);
-                goto done;
+                return NULL;
             }
         }
     }
     if (status != Py_None) {
-        if (PyObject_GetBuffer(status, &views[ports], PyBUF_C_CONTIGUOUS | PyBUF_WRITABLE) != 0) {
-            goto done;
-        }
-        held[ports] = 1;
-        if (views[ports].itemsize != 4 || views[ports].len != 4 * units) {
+        PyArrayObject *array = (PyArrayObject *)status;
+        if (!PyArray_Check(status) || !PyArray_ISSIGNED(array) || PyArray_ITEMSIZE(array) != 4
+            || !PyArray_ISCARRAY(array) || PyArray_SIZE(array) != units) {
             PyErr_SetString(PyExc_ValueError, "the statuses must be 32-bit whole numbers, one for each sample");
-            goto done;
+            return NULL;
         }
-        work.status = (int32_t *)views[ports].buf;
+        work.status = (int32_t *)PyArray_DATA(array);
     }
+    /* the tuple that the caller holds keeps the arrays alive meanwhile */
     if (end - begin > SMALL_BATCH) {
         Py_BEGIN_ALLOW_THREADS
         compute(kernel, &work, in_tiles, begin, end);
@@ -441,10 +397,7 @@ static PyObject *kernel_run(PyObject *self, PyObject *args)
     } else {
         compute(kernel, &work, in_tiles, begin, end);
     }
-    answer = Py_BuildValue("Li", (long long)work.failed, work.not_finite);
-done:
-    release(views, held, ports + 1);
-    return answer;
+    return Py_BuildValue("Li", (long long)work.failed, work.not_finite);
 }
 
 static PyMethodDef call_method = {
@@ -461,7 +414,7 @@ static int read_port(port_t *port, PyObject *shape)
     port->axes = (int)PyTuple_Size(shape);
     port->size = 1;
     for (int axis = 0; axis < port->axes; ++axis) {
-        port->shape[axis] = PyLong_AsSsize_t(PyTuple_GetItem(shape, axis));
+        port->shape[axis] = (npy_intp)PyLong_AsSsize_t(PyTuple_GetItem(shape, axis));
         if (port->shape[axis] < 1) {
             if (!PyErr_Occurred()) {
                 PyErr_SetString(PyExc_ValueError, "a length must be at least 1");
@@ -505,8 +458,8 @@ static int find_functions(kernel_t *kernel, const char *path, const char *name, 
 }
 
 PyDoc_STRVAR(bind_doc,
-    "bind(path, name, abi, is_float, inputs, outputs, numpy, statuses, convert) -> (call, run, width, has_tiles)\n\n"
-    "inputs, outputs : shapes; numpy : (ndarray, empty, scalar type, data type); statuses : by value, or None\n"
+    "bind(path, name, abi, is_float, inputs, outputs, statuses, convert) -> (call, run, width, has_tiles)\n\n"
+    "inputs, outputs : shapes; statuses : by value, or None\n"
     "convert(arguments, by_name) : a tuple of contiguous arrays, for arguments of any other kind; or it raises\n"
     "call(*arguments, **by_name) : results of one sample\n"
     "run(in_tiles, begin, end, count, arrays, statuses) : samples or tiles from begin to end of all; how many failed,\n"
@@ -521,14 +474,10 @@ static PyObject *bind(PyObject *module, PyObject *args)
     int is_float = 0;
     PyObject *inputs = NULL;
     PyObject *outputs = NULL;
-    PyObject *array_type = NULL;
-    PyObject *empty = NULL;
-    PyObject *scalar_type = NULL;
-    PyObject *data_type = NULL;
     PyObject *statuses = NULL;
     PyObject *convert = NULL;
-    if (!PyArg_ParseTuple(args, "ssIpO!O!(OOOO)OO", &path, &name, &abi, &is_float, &PyTuple_Type, &inputs, &PyTuple_Type,
-            &outputs, &array_type, &empty, &scalar_type, &data_type, &statuses, &convert)) {
+    if (!PyArg_ParseTuple(args, "ssIpO!O!OO", &path, &name, &abi, &is_float, &PyTuple_Type, &inputs, &PyTuple_Type,
+            &outputs, &statuses, &convert)) {
         return NULL;
     }
     const Py_ssize_t count_in = PyTuple_Size(inputs);
@@ -551,9 +500,7 @@ static PyObject *bind(PyObject *module, PyObject *args)
     kernel->is_float = is_float;
     kernel->inputs = (int)count_in;
     kernel->outputs = (int)count_out;
-    kernel->array_type = Py_NewRef(array_type);
-    kernel->empty = Py_NewRef(empty);
-    kernel->scalar_type = Py_NewRef(scalar_type);
+    kernel->real = PyArray_DescrFromType(is_float ? NPY_FLOAT : NPY_DOUBLE);
     kernel->statuses = Py_NewRef(statuses);
     kernel->convert = Py_NewRef(convert);
     for (int i = 0; i < kernel->inputs + kernel->outputs; ++i) {
@@ -561,12 +508,6 @@ static PyObject *bind(PyObject *module, PyObject *args)
         PyObject *shape = (k < 0) ? PyTuple_GetItem(inputs, i) : PyTuple_GetItem(outputs, k);
         if (read_port(&kernel->port[i], shape) != 0) {
             goto done;
-        }
-        if (k >= 0 && kernel->port[i].axes != 0) {
-            kernel->port[i].how_to_allocate = PyTuple_Pack(2, shape, data_type);
-            if (kernel->port[i].how_to_allocate == NULL) {
-                goto done;
-            }
         }
     }
     if (find_functions(kernel, path, name, abi) == 0) {
@@ -584,13 +525,18 @@ static PyMethodDef methods[] = {
 };
 
 /* An installed binary may be older than the Python beside it: raise this number with the arguments of `bind`. */
-static int add_interface(PyObject *module)
+static int prepare(PyObject *module)
 {
-    return PyModule_AddIntConstant(module, "INTERFACE", 1);
+    if (_import_array() < 0) {
+        /* of another age, NumPy raises a RuntimeError; NumPy's own macros would print it */
+        PyErr_SetString(PyExc_ImportError, "the binding was compiled for another NumPy");
+        return -1;
+    }
+    return PyModule_AddIntConstant(module, "INTERFACE", 2);
 }
 
 static PyModuleDef_Slot slots[] = {
-    { Py_mod_exec, (void *)add_interface },
+    { Py_mod_exec, (void *)prepare },
     { 0, NULL },
 };
 

@@ -6,11 +6,13 @@ from functools import cache
 from importlib import resources, util
 from typing import Any, Literal
 
+import numpy as np
+
 from optsat.errors import OptsatError
 from optsat.kernels.compilation import compiled, digest_of
 from optsat.kernels.record import KernelRecord
 
-INTERFACE = 1
+INTERFACE = 2
 """Number of the arguments of the module's functions."""
 
 _NAME = "optsat.kernels._binding"
@@ -41,9 +43,11 @@ def cached_binding() -> Any:
     """Return the module compiled from its source into the cache, or None; that needs a compiler and Python.h."""
     import sysconfig
 
-    text = resources.files("optsat.kernels").joinpath("_binding.c").read_text(encoding="utf-8")
+    # compiled with headers of NumPy 1, it does not run with NumPy 2
+    source = resources.files("optsat.kernels").joinpath("_binding.c").read_text(encoding="utf-8")
+    text = f"/* for NumPy {np.__version__} */\n{source}"
     record = KernelRecord("_binding", "double", (), (), text=digest_of(text))
-    extra = [f"-I{sysconfig.get_paths()['include']}"]
+    extra = [f"-I{sysconfig.get_paths()['include']}", f"-I{np.get_include()}"]
     if sys.platform == "darwin":
         extra += ["-undefined", "dynamic_lookup"]
     try:

@@ -3,9 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
-from optsat.kernels.arguments import Arguments, Reals, data_type
+from optsat.kernels.arguments import Arguments, Reals
 from optsat.kernels.form import STATUSES, Kind
 from optsat.kernels.record import KernelRecord
 from optsat.kernels.unit import ABI
@@ -26,7 +24,6 @@ class BoundForm:
         """
         self.kind: Kind = kind
         arguments = Arguments(record.name, record.inputs, record.real)
-        real = data_type(record.real)
         self.call: Callable[..., Any]
         self.call, self._run, self.width, self.has_tiles = module.bind(
             library,
@@ -35,7 +32,6 @@ class BoundForm:
             record.real == "float",
             tuple(port.shape for port in record.inputs),
             tuple(port.shape for port in record.outputs),
-            (np.ndarray, np.empty, real.type, real),
             STATUSES if record.has_status else None,
             arguments.sample,
         )

@@ -1,7 +1,10 @@
 """The binding alone: arguments that no caller of ours gives it are refused, never believed."""
 
+import sys
 from collections.abc import Callable
+from importlib import util
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import casadi as ca
@@ -18,8 +21,6 @@ from optsat.kernels.open_kernel import make_kernel
 from optsat.kernels.unit import ABI
 from optsat.port import Port
 from optsat.symbolic.generated_function import generate
-
-NUMPY = (np.ndarray, np.empty, np.float64, np.dtype(np.float64))
 
 
 @pytest.fixture
@@ -41,7 +42,6 @@ def bind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
             "is_float": False,
             "inputs": ((3,),),
             "outputs": ((3,),),
-            "numpy": NUMPY,
             "statuses": None,
             "convert": lambda _arguments, _by_name: (np.zeros(3),),
         }
@@ -101,7 +101,11 @@ def test_ranges_and_arrays_are_checked(bind: Callable[..., Any]) -> None:
         ((False, 0, 20, 20, (x, "text"), None), "array 1 is not contiguous"),
         ((False, 0, 20, 20, (x, x), None), "arrays 0 and 1 share memory"),
         ((False, 0, 20, 20, (x, y), np.zeros(20)), "statuses must be 32-bit"),
+        ((False, 0, 20, 20, (x, y), np.zeros(20, np.float32)), "statuses must be 32-bit"),
+        ((False, 0, 20, 20, (x, y), np.zeros(20, np.uint32)), "statuses must be 32-bit"),
+        ((False, 0, 20, 20, (x, y), np.zeros(40, np.int32)[::2]), "statuses must be 32-bit"),
         ((False, 0, 20, 20, (x, y), np.zeros(19, np.int32)), "statuses must be 32-bit"),
+        ((False, 0, 20, 20, (x, y), bytes(80)), "statuses must be 32-bit"),
     ):
         with pytest.raises(ValueError, match=message):
             run(*arguments)
@@ -112,6 +116,77 @@ def test_ranges_and_arrays_are_checked(bind: Callable[..., Any]) -> None:
     if not has_tiles:
         with pytest.raises(ValueError, match="no form in tiles"):
             run(True, 0, 5, 5, (x, y), None)
+
+
+def test_only_what_can_be_read_in_place_is_not_converted(bind: Callable[..., Any]) -> None:
+    converted: list[Any] = []
+
+    def convert(arguments: Any, _by_name: Any) -> Any:
+        converted.append(arguments[0])
+        return (np.ones(3),)
+
+    class Own(np.ndarray):  # type: ignore[type-arg]
+        """A subclass, whose numbers may mean something else."""
+
+    call = bind(convert=convert)[0]
+    bytes_apart = np.zeros(25, np.uint8)[1:].view(np.float64)
+    taken = [np.arange(3.0), np.arange(6.0).reshape(2, 3)[1], np.arange(3.0, dtype="=f8"), np.frombuffer(bytes(24))]
+    for array in taken:
+        np.testing.assert_array_equal(call(array), 2 * array)
+    assert converted == []
+    others = [
+        *(np.zeros(6)[::2], np.zeros(3)[::-1], bytes_apart, np.zeros(3, ">f8"), np.zeros(3, np.float32)),
+        *(
+            np.zeros(3, np.int64),
+            np.zeros(3, complex),
+            np.zeros(3, object),
+            np.zeros((3, 1)),
+            np.zeros(4),
+            np.zeros(()),
+        ),
+        *(np.zeros(3).view(Own), np.ma.zeros(3), [0.0] * 3, memoryview(np.zeros(3)), np.array([0.0, np.inf, 0.0]), 0.0),
+    ]
+    for other in others:
+        assert call(other).tolist() == [2.0, 2.0, 2.0]
+    assert len(converted) == len(others)
+
+
+def test_results_are_new_arrays_that_own_their_memory(bind: Callable[..., Any]) -> None:
+    call = bind()[0]
+    first, second = call(np.ones(3)), call(np.zeros(3))
+    assert type(first) is np.ndarray
+    assert first.dtype == np.float64
+    assert first.flags.owndata
+    assert first.flags.carray
+    assert first.tolist() == [2.0, 2.0, 2.0]
+    assert second.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_calls_leave_no_reference_behind(bind: Callable[..., Any]) -> None:
+    call, run, _, _ = bind(statuses=STATUSES)
+    argument, rows, results = np.ones(3), np.ones((20, 3)), np.ones((20, 3))
+    counted = (argument, rows, results, argument.dtype, STATUSES[0])
+    before = [sys.getrefcount(each) for each in counted]
+    for _ in range(100):
+        found, _status = call(argument)
+        run(False, 0, 20, 20, (rows, results), None)
+    assert sys.getrefcount(found) == 2
+    del found, _status
+    assert [sys.getrefcount(each) for each in counted] == before
+
+
+def test_it_does_not_load_beside_another_numpy(bind: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    bind()
+    found = find_binding()
+    assert found is not None
+    spec = util.spec_from_file_location("optsat.kernels._binding", found[0].__file__)
+    assert spec is not None
+    assert spec.loader is not None
+    for name in ("numpy._core._multiarray_umath", "numpy.core._multiarray_umath"):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    with pytest.raises(ImportError, match="compiled for another NumPy"):
+        spec.loader.exec_module(util.module_from_spec(spec))
+    monkeypatch.undo()
 
 
 def test_a_conversion_is_not_believed(bind: Callable[..., Any]) -> None:

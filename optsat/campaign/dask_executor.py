@@ -97,8 +97,11 @@ def _run(client: Any, task: Task, chunks: Sequence[Chunk], window: int) -> Itera
         client.cancel(list(running), force=True)
 
 
-def _outcomes(client: Any, task: Task, numbers: range, future: Any) -> Outcomes:
-    """Return the outcomes of a task; of one that kills its workers, those of its halves."""
+def _outcomes(client: Any, task: Task, numbers: range, future: Any, once_more: bool = True) -> Outcomes:
+    """Return the outcomes of a task; of one that kills its workers, those of its halves, one after the other.
+
+    once_more : a case that is left alone gets a second chance, for its worker may have died of another task
+    """
     distributed = _distributed()
     try:
         outcomes: Outcomes = future.result()
@@ -106,8 +109,10 @@ def _outcomes(client: Any, task: Task, numbers: range, future: Any) -> Outcomes:
     except distributed.CancelledError:
         raise ConnectionError("its tasks were cancelled") from None
     except distributed.KilledWorker:
-        if len(numbers) == 1:
+        if len(numbers) == 1 and not once_more:
             return crashed(numbers[0])
     half = len(numbers) // 2
-    parts = [(part, client.submit(task, part, pure=False, retries=0)) for part in (numbers[:half], numbers[half:])]
-    return joined([_outcomes(client, task, part, future) for part, future in parts])
+    parts = [numbers[:half], numbers[half:]] if half else [numbers]
+    return joined(
+        [_outcomes(client, task, part, client.submit(task, part, pure=False, retries=0), half > 0) for part in parts]
+    )

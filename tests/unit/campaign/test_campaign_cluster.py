@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import batch_study
@@ -16,67 +16,58 @@ import slow_study
 from optsat.campaign import case_runs, runner
 from optsat.campaign.dask_executor import Dask
 from optsat.campaign.runner import run_study
-from optsat.errors import InputError, OptsatError
+from optsat.errors import InputError, MissingExtraError, OptsatError
 
 pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
 
 CASES = 60
-DEADLY = 17
+DEADLY = 61
 
 
 def _start(module: str, folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
     environment = os.environ | {
         "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[3])]),
         **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
+        slow_study.DEADLY: str(DEADLY),
+        # a task is given up after the first worker that it kills, not after four
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
     }
     with (folder / "log").open("ab") as log:
-        command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments]
+        command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments, "--host", "127.0.0.1"]
         return subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log, start_new_session=True)
 
 
-def _wait(ready: Callable[[], bool], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not ready():
-        assert time.monotonic() < end, "the cluster did not start"
+def _start_scheduler(folder: Path) -> tuple["subprocess.Popen[bytes]", str]:
+    file = folder / "scheduler.json"
+    ports = ("--port", "0", "--dashboard-address", "127.0.0.1:0")
+    scheduler = _start("dask_scheduler", folder, *ports, "--scheduler-file", str(file))
+    end = time.monotonic() + 60.0
+    while not (file.exists() and file.stat().st_size > 0):
+        assert time.monotonic() < end, "the scheduler did not start"
         time.sleep(0.05)
+    return scheduler, json.loads(file.read_text())["address"]
+
+
+def _start_worker(folder: Path, address: str) -> "subprocess.Popen[bytes]":
+    return _start("dask_worker", folder, address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "30")
+
+
+def _stop(processes: "Iterable[subprocess.Popen[bytes]]") -> None:
+    for process in processes:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     folder = tmp_path_factory.mktemp("cluster")
-    file = folder / "scheduler.json"
-    local = ("--host", "127.0.0.1")
-    scheduler = _start(
-        "dask_scheduler",
-        folder,
-        *local,
-        "--port",
-        "0",
-        "--dashboard-address",
-        "127.0.0.1:0",
-        "--scheduler-file",
-        str(file),
-    )
+    scheduler, address = _start_scheduler(folder)
     processes = [scheduler]
     try:
-        _wait(lambda: file.exists() and file.stat().st_size > 0)
-        for _ in range(2):
-            options = (
-                *local,
-                "--nthreads",
-                "1",
-                "--no-dashboard",
-                "--death-timeout",
-                "30",
-                "--scheduler-file",
-                str(file),
-            )
-            processes.append(_start("dask_worker", folder, *options))
-        yield json.loads(file.read_text())["address"]
+        processes += [_start_worker(folder, address) for _ in range(2)]
+        yield address
     finally:
-        for process in processes:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        _stop(processes)
 
 
 @pytest.fixture(autouse=True)
@@ -105,6 +96,42 @@ def test_a_cluster_gives_the_same_bytes_of_batches(
     run_study(batch_study.study, out=tmp_path / "serial")
     found = {(*_bytes(folder), (folder / "complete.json").read_bytes()) for folder in tmp_path.iterdir()}
     assert len(found) == 1
+
+
+def test_a_case_that_kills_its_workers_is_a_failure_and_the_rest_is_there(cluster: str, tmp_path: Path) -> None:
+    result = run_study(slow_study.study, cases=63, out=tmp_path, executor=Dask(cluster))
+    assert [(failure.case, failure.error) for failure in result.failures] == [(DEADLY, "CRASHED")]
+    whole = run_study(slow_study.study, cases=63)
+    assert [row["trace"] for row in result.rows] == [row["trace"] for row in whole.rows if row["case"] != DEADLY]
+
+
+def test_a_cluster_without_workers_and_one_that_is_lost(tmp_path: Path) -> None:
+    scheduler, address = _start_scheduler(tmp_path)
+    processes = [scheduler]
+    folder = tmp_path / "run"
+
+    def lose(done: int, _total: int) -> None:
+        if done == 14:
+            _stop([scheduler])
+
+    try:
+        with pytest.raises(OptsatError, match=r"has no worker\. Start some with `dask worker tcp://"):
+            run_study(slow_study.study, cases=2, executor=Dask(address, connect_s=0.5))
+        processes.append(_start_worker(tmp_path, address))
+        with pytest.raises(OptsatError, match=r"was lost \(.*run the same command with --resume"):
+            run_study(slow_study.study, cases=CASES, out=folder, executor=Dask(address, connect_s=60), progress=lose)
+    finally:
+        _stop(processes[1:] if scheduler.poll() is not None else processes)
+    assert len(list(folder.glob("chunks/[0-9]*"))) >= 2
+    run_study(slow_study.study, cases=CASES, out=folder, resume=True)
+    run_study(slow_study.study, cases=CASES, out=tmp_path / "serial")
+    assert _bytes(folder) == _bytes(tmp_path / "serial")
+
+
+def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingExtraError, match=r"optsat\[cluster\]"):
+        run_study(slow_study.study, cases=2, executor=Dask("tcp://127.0.0.1:9"))
 
 
 def test_without_a_cluster(tmp_path: Path) -> None:

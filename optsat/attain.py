@@ -6,14 +6,13 @@ from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from optsat.attain_runs import best_attainment
+from optsat.attain_runs import Engine, best_attainment
 from optsat.errors import explain_unknown_options
 from optsat.problems.attainment import Attainment
 from optsat.problems.goal_attainment import GoalAttainment
 from optsat.problems.minimax import Minimax
 from optsat.problems.multi_objective import MultiObjective, RegionOptions
 from optsat.solution import Solution
-from optsat.solve import Solver
 
 Start = ArrayLike | Solution[Attainment] | None
 
@@ -30,7 +29,7 @@ def goal_attain(
     start: Start = None,
     starts: int = 1,
     seed: int = 0,
-    engine: str | Solver = "auto",
+    engine: Engine = "auto",
     **region: Unpack[RegionOptions],
 ) -> Solution[Attainment]:
     """Return the x whose objectives attain their goals best: minimise t subject to F_i(x) - goal_i <= w_i t.
@@ -48,7 +47,9 @@ def goal_attain(
     start : (n,), moved into the bounds, or an earlier solution of the same problem (warm start); with symbols and no
     start the middle of the bounds, 0 where there is none
     starts, seed : number of starts, the others from a Sobol sequence over the bounds; the best answer is returned
-    engine : "auto" tries the engines of the table in turn until one's answer passes re-evaluation; or a name or solver
+    engine : "auto" tries the engines of the table in turn until one's answer passes re-evaluation; or a name, a solver,
+    or a sequence of them, tried in its order;
+    "compiled_minmax" compiles the problem first (a second or two once, then microseconds) and falls back on "auto"
 
     Returns a Solution: `answer.x`, `.objectives`, `.factor` (t re-evaluated), `.active`, `.multipliers`; `proof` is
     GLOBAL, STATIONARY, FEASIBLE, NOTHING or INFEASIBLE; `residuals["kkt"]` recomputed; `stats["runs"]` which engine
@@ -79,7 +80,7 @@ def minimax(
     start: Start = None,
     starts: int = 1,
     seed: int = 0,
-    engine: str | Solver = "auto",
+    engine: Engine = "auto",
     **region: Unpack[RegionOptions],
 ) -> Solution[Attainment]:
     """Return the x whose largest objective is least: minimise max_i F_i(x).
@@ -104,7 +105,7 @@ def point_of(start: Start) -> ArrayLike | None:
     return start.answer.x if isinstance(start, Solution) else start
 
 
-def _best(problem: MultiObjective, start: Start, starts: int, seed: int, engine: str | Solver) -> Solution[Attainment]:
+def _best(problem: MultiObjective, start: Start, starts: int, seed: int, engine: Engine) -> Solution[Attainment]:
     best = best_attainment(problem, start, starts, seed, engine)
     if best.answer.violated:
         # the caller of the verb, beyond this function, the verb and its check of options

@@ -1,5 +1,6 @@
 """Engine runs: the engines of one problem in turn, from many starts, each answer judged by re-evaluation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -17,6 +18,9 @@ from optsat.solve import Solver, solve
 if TYPE_CHECKING:
     from optsat.problems.attainment import Attainment, MinMaxProblem
     from optsat.problems.least_violation import LeastViolation
+
+# a name, a solver, or several to be tried in this order
+Engine = str | Solver | Sequence[str | Solver]
 
 # KKT residual of an answer that is taken without trying the next engine
 _ACCURATE = 1e-8
@@ -49,7 +53,7 @@ class EngineRun:
 class _Search:
     """The runs of one call, in order, with the engines that may take part."""
 
-    def __init__(self, problem: "MinMaxProblem", engine: "str | Solver") -> None:
+    def __init__(self, problem: "MinMaxProblem", engine: "Engine") -> None:
         self.problem = problem
         self.form = problem.lower()
         self.engine = engine
@@ -94,7 +98,7 @@ def best_attainment(
     start: "ArrayLike | Solution[Attainment] | None",
     starts: int,
     seed: int,
-    engine: "str | Solver",
+    engine: "Engine",
 ) -> "Solution[Attainment]":
     """Return the best answer of the engines from all starts, with how each run was judged in `stats["runs"]`.
 
@@ -127,18 +131,25 @@ def _defined(form: MinMaxForm, x: Array) -> bool:
     return bool(np.all(np.isfinite(form.objectives.values(x))) and np.all(np.isfinite(form.constraints.values(x))))
 
 
-def _engines(form: object, engine: "str | Solver") -> "list[Solver]":
+def _engines(form: object, engine: "Engine") -> "list[Solver]":
     from optsat.solvers import SOLVERS
 
+    if isinstance(engine, Sequence) and not isinstance(engine, str):
+        chosen = [each for part in engine for each in _engines(form, part)]
+        if not chosen:
+            raise InputError("`engine` is empty; give a name, a solver, or several of them in the order to try.")
+        return list({each.name: each for each in chosen}.values())
     if not isinstance(engine, str):
         return [engine]
-    fitting = [solver for solver in SOLVERS if solver.accepts(form)]
+    always = [each for each in SOLVERS if not getattr(each, "by_name_only", False) and each.accepts(form)]
     if engine == "auto":
-        return fitting
-    names = [solver.name for solver in fitting]
-    if engine not in names:
-        raise InputError(f"`engine` {engine!r} cannot solve this problem or is unknown.{nearest_name(engine, names)}")
-    return [fitting[names.index(engine)]]
+        return always
+    named = [each for each in SOLVERS if each.name == engine and each.accepts(form)]
+    if not named:
+        known = [*(each.name for each in SOLVERS if each.accepts(form)), "auto"]
+        raise InputError(f"`engine` {engine!r} cannot solve this problem or is unknown.{nearest_name(engine, known)}")
+    # what is there for speed alone leaves the rest to the others
+    return named if named[0] in always else [*named, *always]
 
 
 def _judged(solution: "Solution[Attainment]", engine: str, start: int, seconds: float) -> EngineRun:

@@ -12,6 +12,9 @@ from optsat.forms import MinMaxForm
 from optsat.smooth_map import SmoothMap, SymbolicMap
 from optsat.symbolic.curvature import Rest, Shape, shapes_of
 
+# a negative eigenvalue beyond this fraction of the largest is no rounding
+_BENT = 1e-6
+
 
 @dataclass(frozen=True)
 class ConvexRows:
@@ -48,6 +51,8 @@ class ConvexRows:
 @lru_cache(maxsize=16)
 def convex_rows(form: MinMaxForm) -> ConvexRows | None:
     """Return the shapes of the rows when all of them are surely convex, else None."""
+    if _bends_down(form):
+        return None
     objectives, constraints = _shapes(form, form.objectives), _shapes(form, form.constraints)
     if objectives is None or constraints is None:
         return None
@@ -74,6 +79,25 @@ def convex_rows(form: MinMaxForm) -> ConvexRows | None:
     if not all(shape.convex for shape in (*rows, *upper, *lower)):
         return None
     return ConvexRows(rows, upper, lower)
+
+
+def _bends_down(form: MinMaxForm) -> bool:
+    """Return whether some row has negative curvature at the start, which settles the matter without an analysis."""
+    maps = [
+        (form.objectives, zip(form.objective.tolist(), form.sign.tolist(), strict=True)),
+        (form.constraints, ((i, 1.0) for i in np.flatnonzero(np.isfinite(form.constraint_upper)).tolist())),
+        (form.constraints, ((i, -1.0) for i in np.flatnonzero(np.isfinite(form.constraint_lower)).tolist())),
+    ]
+    for values, rows in maps:
+        for i, sign in rows:
+            if not isinstance(values, SymbolicMap):
+                return False
+            hessian = values.hessian(form.start, sign * (np.arange(values.size) == i))
+            if np.all(np.isfinite(hessian)):
+                curvature = np.linalg.eigvalsh(hessian)
+                if curvature[0] < -_BENT * np.max(np.abs(curvature)):
+                    return True
+    return False
 
 
 def _shapes(form: MinMaxForm, values: SmoothMap) -> tuple[Shape, ...] | None:

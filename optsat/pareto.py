@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from optsat.arrays import Array
-from optsat.attain_runs import best_attainment
+from optsat.attain_runs import Engine, best_attainment
 from optsat.errors import InputError, NotProvenError, explain_unknown_options, nearest_name
 from optsat.problems.attainment import Attainment
 from optsat.problems.minimax import Minimax
@@ -18,7 +18,6 @@ from optsat.problems.multi_objective import RegionOptions
 from optsat.problems.pareto_front import ParetoFront, ParetoPoint, Verdict, judged
 from optsat.problems.scalarisation import Scalarisation, along, bounded, weighted_sum
 from optsat.solution import Proof, Solution
-from optsat.solve import Solver
 
 Method = Literal["weights", "epsilon_constraint", "normal_boundary"]
 
@@ -41,7 +40,7 @@ def pareto_sweep(
     start: ArrayLike | None = None,
     starts: int = 1,
     seed: int = 0,
-    engine: str | Solver = "auto",
+    engine: Engine = "auto",
     **region: Unpack[RegionOptions],
 ) -> ParetoFront:
     """Return the Pareto front of two or three objectives that are all to be small.
@@ -90,7 +89,7 @@ def pareto_sweep(
 class _Sweep:
     """How every point of one sweep is solved."""
 
-    def __init__(self, problem: Minimax, starts: int, seed: int, engine: str | Solver) -> None:
+    def __init__(self, problem: Minimax, starts: int, seed: int, engine: Engine) -> None:
         self.problem = problem
         self.starts, self.seed, self.engine = starts, seed, engine
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from optsat.arrays import Array, finite_array
 from optsat.attain import Start, point_of
-from optsat.attain_runs import best_attainment
+from optsat.attain_runs import Engine, best_attainment
 from optsat.attitude.backend import is_symbolic
 from optsat.certificates.box_maximum import BoxMaximum, largest_over_box
 from optsat.errors import InputError, explain_unknown_options
@@ -19,7 +19,6 @@ from optsat.problems.minimax import Minimax
 from optsat.problems.uncertain_rows import UncertainRow, uncertain_rows
 from optsat.problems.user_function import count_of, parameter_values
 from optsat.solution import Proof, Solution
-from optsat.solve import Solver
 
 _MOST_BOXES = 2000
 _MOST_ROUNDS = 30
@@ -68,7 +67,7 @@ def robust_minimax(
     start: Start = None,
     starts: int = 1,
     seed: int = 0,
-    engine: str | Solver = "auto",
+    engine: Engine = "auto",
     tolerance: float = 1e-6,
 ) -> Solution[WorstCase]:
     """Return the x whose largest objective over a box of uncertain quantities is least: min_x max_i max_u F_i(x, u).
@@ -98,13 +97,14 @@ def robust_minimax(
         raise InputError(f"`tolerance` must be > 0, got {tolerance!r}.")
     given: Any = {"lb": lb, "ub": ub, "A": A, "b": b, "Aeq": Aeq, "beq": beq}
     warm: Start = start
-    for number in range(1, _MOST_ROUNDS + 1):
+    rounds, more = 0, True
+    while more and rounds < _MOST_ROUNDS:
+        rounds += 1
         finite = best_attainment(robust.finite(given, point_of(warm)), None, starts, seed, engine)
         worst = robust.worst(finite.answer.x, tolerance * max(1.0, abs(finite.answer.factor)))
-        if not robust.add(worst, finite, tolerance) or number == _MOST_ROUNDS:
-            break
+        more = robust.add(worst, finite, tolerance)
         warm = finite.answer.x
-    solution = robust.told(finite, worst, tolerance, number)
+    solution = robust.told(finite, worst, tolerance, rounds)
     if solution.proof in (Proof.NOTHING, Proof.INFEASIBLE):
         warnings.warn(robust.complaint(solution, tolerance), stacklevel=3)
     return solution
@@ -259,6 +259,6 @@ class _Robust:
             return answer.attainment.message()
         return (
             f"The worst case over the box is between {answer.worst:.9g} and {answer.bound:.9g} at the answer, wider "
-            f"than the tolerance {tolerance:g}; constraints may reach {answer.constraint_bound:.3g}. Narrow the box, raise "
-            "`tolerance`, or write the functions with fewer repeated quantities."
+            f"than the tolerance {tolerance:g}; constraints may reach {answer.constraint_bound:.3g}. Narrow the box, "
+            "raise `tolerance`, or write the functions with fewer repeated quantities."
         )

@@ -1,7 +1,8 @@
 """Smooth map: a vector function of the unknowns with its derivatives, from CasADi or from a plain Python callable."""
 
+import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -36,6 +37,8 @@ class SymbolicMap:
 
     function: Any
     p: Array
+    # the last values and where, since problem, solver and proof ask at the same points
+    _last: dict[bytes, Array] = field(init=False, repr=False, default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -44,15 +47,49 @@ class SymbolicMap:
 
     def values(self, x: Array) -> Array:
         """Return the values (size,) at x (n,)."""
-        return np.asarray(self.function(x, self.p).full()).reshape(-1)
+        place = x.tobytes()
+        known = self._last.get(place)
+        if known is None:
+            known = _machine(self.function)(x, self.p).reshape(-1)
+            self._last.clear()
+            self._last[place] = known
+        return known.copy()
 
     def jacobian(self, x: Array) -> Array:
         """Return the derivatives (size, n) at x (n,)."""
-        return np.asarray(_jacobian(self.function)(x, self.p).full())
+        return _machine(_jacobian(self.function))(x, self.p)
 
     def hessian(self, x: Array, multipliers: Array) -> Array:
         """Return the second derivatives (n, n) of multipliers . values at x (n,)."""
-        return np.asarray(_hessian(self.function)(x, self.p, multipliers).full())
+        return _machine(_hessian(self.function))(x, self.p, multipliers)
+
+
+class _Machine:
+    """A Function of dense columns with one dense result, called on memory of its own: conversions cost more than it."""
+
+    def __init__(self, function: Any) -> None:
+        self.lock = threading.Lock()
+        self.arguments = [np.zeros(function.size1_in(i)) for i in range(function.n_in())]
+        # column by column, as CasADi keeps it
+        self.result = np.zeros((function.size2_out(0), function.size1_out(0)))
+        self.buffer, self.trigger = function.buffer()
+        for i, each in enumerate(self.arguments):
+            self.buffer.set_arg(i, each.data)
+        self.buffer.set_res(0, self.result.reshape(-1).data)
+
+    def __call__(self, *arguments: Array) -> Array:
+        with self.lock:
+            for kept, value in zip(self.arguments, arguments, strict=True):
+                kept[:] = value
+            self.trigger()
+            if self.buffer.ret():
+                raise RuntimeError("a CasADi function failed")
+            return self.result.T.copy()
+
+
+@lru_cache(maxsize=192)
+def _machine(function: Any) -> _Machine:
+    return _Machine(function)
 
 
 # derivatives are kept with the Function, so that a new parameter value or a warm start costs no differentiation

@@ -18,8 +18,10 @@ from optsat.symbolic.interval_evaluation import evaluate_over_box
 _MOST_CORNERS = 256
 # operations with kinks or jumps, whose derivatives say nothing about curvature
 _NOT_SMOOTH = frozenset(
-    ("FABS", "FMAX", "FMIN", "SIGN", "FLOOR", "CEIL", "FMOD", "REMAINDER", "COPYSIGN", "HYPOT", "ATAN2")
-    + ("IF_ELSE_ZERO", "LT", "LE", "EQ", "NE", "NOT", "AND", "OR")
+    (
+        *("FABS", "FMAX", "FMIN", "SIGN", "FLOOR", "CEIL", "FMOD", "REMAINDER", "COPYSIGN", "HYPOT", "ATAN2"),
+        *("IF_ELSE_ZERO", "LT", "LE", "EQ", "NE", "NOT", "AND", "OR"),
+    )
 )
 
 

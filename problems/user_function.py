@@ -113,7 +113,30 @@ def _of_expression(name: str, expression: Any, unknowns: Unknowns) -> Any:
         column = type(unknowns.symbol)(ca.vertcat(*(ca.vec(part) if is_symbolic(part) else part for part in parts)))
     except (NotImplementedError, RuntimeError):
         raise InputError(f"`{name}` must be CasADi expressions of one kind (SX or MX), got {expression!r}.") from None
+    if isinstance(column, ca.SX):
+        return _of_same_elements(_Elements.of(unknowns, column), name)
     return _function(name, unknowns, column)
+
+
+@dataclass(frozen=True)
+class _Elements:
+    """Expressions by the identity of their elements, which live as long as this does."""
+
+    identity: tuple[int, ...]
+    unknowns: Unknowns = field(compare=False)
+    column: Any = field(compare=False)
+
+    @classmethod
+    def of(cls, unknowns: Unknowns, column: Any) -> "_Elements":
+        symbols = [unknowns.symbol] if unknowns.parameters is None else [unknowns.symbol, unknowns.parameters]
+        counted = [each.element_hash() for part in (*symbols, column) for each in part.elements()]
+        return cls((*map(len, map(type(column).elements, symbols)), *counted), unknowns, type(column)(column))
+
+
+# the very same expressions again, perhaps with other goals and parameters, need not even be read
+@lru_cache(maxsize=64)
+def _of_same_elements(elements: _Elements, name: str) -> Any:
+    return _function(name, elements.unknowns, elements.column)
 
 
 def _of_function(name: str, function: Any, unknowns: Unknowns) -> Any:

@@ -6,6 +6,7 @@ if __name__ != "optsat.solvers":
 from optsat.solve import Solver
 from optsat.solvers.cell_cover import CellCoverSolver
 from optsat.solvers.clarabel import Clarabel
+from optsat.solvers.compiled_minmax import CompiledMinMax
 from optsat.solvers.conic_minmax import ConicMinMax
 from optsat.solvers.davenport import Davenport
 from optsat.solvers.ipopt import Ipopt
@@ -34,4 +35,5 @@ SOLVERS: tuple[Solver, ...] = (
     Sqp("osqp"),
     Sqp("ipqp"),
     Slsqp(),
+    CompiledMinMax(),
 )

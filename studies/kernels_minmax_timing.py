@@ -86,6 +86,11 @@ def draw_problems(rng: np.random.Generator, count: int) -> Array:
     return np.stack([b_B, ERROR * np.abs(measured), y_B], axis=1)
 
 
+def limits() -> Array:
+    """Return the upper bounds (3 + m,) of the unknowns; the lower ones are their negatives."""
+    return _UPPER.copy()
+
+
 def kernel_arguments(problems: Array) -> list[Array]:
     """Return the arguments of `minmax_attitude` for problems (..., 3, m, 3), losses in units of the squared error."""
     b_B, radius_B, y_B = np.moveaxis(problems, -3, 0)

@@ -10,6 +10,8 @@ from optsat.forms import MinMaxForm
 
 # slacks, relative to the size of the bound, below which a row may press: the best of the three is kept
 _ACTIVE = (1e-9, 1e-7, 1e-5)
+# residual of the solver's own multipliers below which no better ones are sought
+_GOOD = 1e-10
 
 
 @dataclass(frozen=True)
@@ -121,29 +123,33 @@ def first_order(form: MinMaxForm, x: Array, dual: Array) -> FirstOrder:
     rows = one_sided_rows(form, x)
     length = len(form.weight) + form.constraints.size + len(form.A) + len(x)
     weight_sum = float("nan")
-    candidates = []
-    if np.all(np.isfinite(rows.gradient)):
-        candidates = [_fitted(rows, rows.slack <= tolerance * rows.scale) for tolerance in _ACTIVE]
-    if candidates and len(dual) == length and np.all(np.isfinite(dual)):
-        given = rows.multipliers(dual)
-        weight_sum = float(rows.weight @ given)
-        candidates.append(given)
     size = max(1.0, abs(form.factor(form.objectives.values(x))))
-    judged = []
-    for multipliers in candidates:
-        total = float(rows.weight @ multipliers)
-        if not total > 0:
-            continue
-        scaled = multipliers / total
-        terms = scaled[:, None] * rows.gradient
-        stationarity = float(np.max(np.abs(terms.sum(axis=0))) / max(1.0, np.max(np.abs(terms), initial=0.0)))
-        complementarity = float(np.max(scaled * np.maximum(rows.slack, 0.0))) / size
-        judged.append((max(stationarity, complementarity), stationarity, complementarity, scaled))
+    judged: list[tuple[float, float, float, Array]] = []
+    if np.all(np.isfinite(rows.gradient)):
+        if len(dual) == length and np.all(np.isfinite(dual)):
+            given = rows.multipliers(dual)
+            weight_sum = float(rows.weight @ given)
+            judged += _judged(rows, given, size)
+        if not judged or judged[0][0] > _GOOD:
+            for tolerance in _ACTIVE:
+                judged += _judged(rows, _fitted(rows, rows.slack <= tolerance * rows.scale), size)
     if not judged:
         nothing = np.zeros(len(rows.slack))
         return FirstOrder(rows, nothing, np.zeros(length), np.inf, np.inf, rows.violation, weight_sum)
     _, stationarity, complementarity, best = min(judged, key=lambda each: each[0])
     return FirstOrder(rows, best, rows.dual(best, length), stationarity, complementarity, rows.violation, weight_sum)
+
+
+def _judged(rows: OneSidedRows, multipliers: Array, size: float) -> list[tuple[float, float, float, Array]]:
+    """Return residual, stationarity and complementarity of the multipliers at weight sum 1; nothing where it is 0."""
+    total = float(rows.weight @ multipliers)
+    if not total > 0:
+        return []
+    scaled = multipliers / total
+    terms = scaled[:, None] * rows.gradient
+    stationarity = float(np.max(np.abs(terms.sum(axis=0))) / max(1.0, np.max(np.abs(terms), initial=0.0)))
+    complementarity = float(np.max(scaled * np.maximum(rows.slack, 0.0))) / size
+    return [(max(stationarity, complementarity), stationarity, complementarity, scaled)]
 
 
 def _fitted(rows: OneSidedRows, active: Mask) -> Array:

@@ -153,7 +153,7 @@ def test_the_search_bounds_what_no_sample_exceeds(seed: int) -> None:
     function = ca.Function("f", [X, U], [value])
     samples = np.asarray(function.map(4000)(np.zeros((2, 4000)), rng.uniform(-1, 2, (2, 4000))).full())
     for most, tolerance in ((4000, 1e-6), (15, 1e-9)):
-        found = largest_over_box(row.row, np.zeros(2), np.zeros(0), *boxes[1], tolerance, most)
+        found = largest_over_box(row.row, np.zeros(2), np.zeros(0), boxes[1][0], boxes[1][1], tolerance, most)
         assert samples.max() <= found.bound
         assert found.value <= found.bound
         assert float(function(np.zeros(2), found.u)) == pytest.approx(found.value, abs=1e-12)

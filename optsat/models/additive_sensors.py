@@ -123,7 +123,7 @@ class PositionReceiver:
 
 @dataclass(frozen=True)
 class PressureSensor:
-    """Chamber-pressure sensors that tell the torque of each axis of thrusters, mean since the sample before.
+    """Chamber-pressure sensors that tell the torque of each axis of thrusters just before the sample.
 
     sigma : standard deviation of each torque [N m]
 

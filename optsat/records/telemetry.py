@@ -24,7 +24,7 @@ class Telemetry:
     gps_r_N : (T, 3) position [m]
     accelerometer : (T, 3) acceleration [m/s^2]; the spacecraft says of what and along which axes
     skewed_gyro_rate : (T,) rate about the axis of a redundant single-axis gyro [rad/s]
-    pressure_torque_B : (T, 3) torque told from the chamber pressures, mean from t[k - 1] to t[k] [N m]
+    pressure_torque_B : (T, 3) torque told from the chamber pressures, of the thrust just before t[k] [N m]
     epoch : the instant t = 0, ISO 8601, or None
     source : where the data come from, for people
     bad_rows : what the reader refused

@@ -1,5 +1,6 @@
 """The binding alone: arguments that no caller of ours gives it are refused, never believed."""
 
+import array
 import sys
 from collections.abc import Callable
 from importlib import util
@@ -125,27 +126,20 @@ def test_only_what_can_be_read_in_place_is_not_converted(bind: Callable[..., Any
         converted.append(arguments[0])
         return (np.ones(3),)
 
-    class Own(np.ndarray):  # type: ignore[type-arg]
+    class Own(np.ndarray):
         """A subclass, whose numbers may mean something else."""
 
     call = bind(convert=convert)[0]
     bytes_apart = np.zeros(25, np.uint8)[1:].view(np.float64)
     taken = [np.arange(3.0), np.arange(6.0).reshape(2, 3)[1], np.arange(3.0, dtype="=f8"), np.frombuffer(bytes(24))]
-    for array in taken:
-        np.testing.assert_array_equal(call(array), 2 * array)
+    for each in taken:
+        np.testing.assert_array_equal(call(each), 2 * each)
     assert converted == []
-    others = [
-        *(np.zeros(6)[::2], np.zeros(3)[::-1], bytes_apart, np.zeros(3, ">f8"), np.zeros(3, np.float32)),
-        *(
-            np.zeros(3, np.int64),
-            np.zeros(3, complex),
-            np.zeros(3, object),
-            np.zeros((3, 1)),
-            np.zeros(4),
-            np.zeros(()),
-        ),
-        *(np.zeros(3).view(Own), np.ma.zeros(3), [0.0] * 3, memoryview(np.zeros(3)), np.array([0.0, np.inf, 0.0]), 0.0),
-    ]
+    elsewhere: list[Any] = [np.zeros(6)[::2], np.zeros(3)[::-1], bytes_apart]
+    other_reals = [np.zeros(3, kind) for kind in (">f8", np.float32, np.int64, complex, object)]
+    shaped = [np.zeros((3, 1)), np.zeros(4), np.zeros(())]
+    kinds: list[Any] = [np.zeros(3).view(Own), np.ma.zeros(3), [0.0] * 3, array.array("d", [0.0] * 3), 0.0]
+    others = [*elsewhere, *other_reals, *shaped, *kinds, np.array([0.0, np.inf, 0.0])]
     for other in others:
         assert call(other).tolist() == [2.0, 2.0, 2.0]
     assert len(converted) == len(others)
@@ -168,10 +162,11 @@ def test_calls_leave_no_reference_behind(bind: Callable[..., Any]) -> None:
     counted = (argument, rows, results, argument.dtype, STATUSES[0])
     before = [sys.getrefcount(each) for each in counted]
     for _ in range(100):
-        found, _status = call(argument)
+        call(argument)
         run(False, 0, 20, 20, (rows, results), None)
+    found = call(argument)[0]
     assert sys.getrefcount(found) == 2
-    del found, _status
+    del found
     assert [sys.getrefcount(each) for each in counted] == before
 
 

@@ -1,0 +1,120 @@
+"""Bank model: what a hypothesis bank is made of, from its motion and sensors to the kernel of one step."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from optsat.attitude.backend import Value
+from optsat.errors import InputError
+from optsat.kernels.hypothesis_bank import BankStructure, hypothesis_bank
+from optsat.kernels.source import KernelSource
+from optsat.models.parts import Part
+from optsat.port import Port
+from optsat.symbolic.generated_function import GeneratedFunction
+
+Fault = tuple[Part, ...]
+"""Parts that fail together, as one bit of a mode's number."""
+
+
+@dataclass(frozen=True, eq=False)
+class BankModel:
+    """The functions and ports of `optsat.kernels.hypothesis_bank.hypothesis_bank`, with what its bits and states mean.
+
+    faults : parts of each bit; channels : part of each channel, in the order of use
+    states : names of the error states with their units
+    """
+
+    structure: BankStructure
+    predict: GeneratedFunction
+    observe: GeneratedFunction
+    shift: GeneratedFunction
+    reference: tuple[Port, ...]
+    carried: tuple[Port, ...]
+    inputs: tuple[Port, ...]
+    faults: tuple[Fault, ...]
+    channels: tuple[Part, ...]
+    states: tuple[str, ...]
+
+    def kernel_source(self, name: str, floor: float = 1e-60) -> KernelSource:
+        """Return the kernel of one step.
+
+        Raises
+        ------
+        InputError : the floor of probabilities is above 1e-30.
+        """
+        return hypothesis_bank(
+            name,
+            self.structure,
+            self.predict,
+            self.observe,
+            self.shift,
+            self.reference,
+            self.carried,
+            self.inputs,
+            floor,
+        )
+
+
+def checked_faults(faults: Sequence[Part | Sequence[Part]], known: Sequence[Part]) -> tuple[Fault, ...]:
+    """Return the parts of each bit as tuples.
+
+    Raises
+    ------
+    InputError : none, more than ten, a part that this bank has not, a part named twice, or sensors that share a bit.
+    """
+    found = tuple((each,) if isinstance(each, Part) else tuple(each) for each in faults)
+    if not 1 <= len(found) <= 10:
+        raise InputError(f"`faults` must name 1 to 10 faults, got {len(found)}: a bank of n faults has 2^n modes.")
+    listed = [part for fault in found for part in fault]
+    for part in listed:
+        if part not in known:
+            names = ", ".join(each.value for each in known)
+            raise InputError(f"`faults`: {getattr(part, 'value', part)!r} is no part of this bank. Known: {names}.")
+        if listed.count(part) > 1:
+            raise InputError(f"`faults` names {part.value} twice.")
+    for fault in found:
+        if not fault or (len(fault) > 1 and not all(part.is_thruster for part in fault)):
+            names = ", ".join(part.value for part in fault)
+            raise InputError(f"`faults`: only thrusters can share a fault, got ({names}). Name sensors one by one.")
+    return found
+
+
+def pattern_of(matrix: Value) -> tuple[tuple[tuple[int, int], ...], Value]:
+    """Return the places (row, column) of the structural non-zeros of a CasADi matrix, by rows, and their values."""
+    import casadi as ca
+
+    rows, columns = matrix.sparsity().get_triplet()
+    places = tuple(sorted(zip(map(int, rows), map(int, columns), strict=True)))
+    return places, ca.vertcat(*(matrix[i, j] for i, j in places))
+
+
+def chain_over(fail: float, recover: float, steps: Value) -> tuple[Value, Value]:
+    """Return the chances to fail and to recover over a number of steps, not always whole, of a chain with these two.
+
+    Raises
+    ------
+    InputError : a chance is outside [0, 1], or both together are not in (0, 1).
+    """
+    import casadi as ca
+
+    if not (0.0 <= fail <= 1.0 and 0.0 <= recover <= 1.0 and 0.0 < fail + recover < 1.0):
+        raise InputError(
+            f"The chances per step to fail, {fail!r}, and to recover, {recover!r}, must lie in [0, 1], with a sum "
+            "above 0 and below 1."
+        )
+    total = fail + recover
+    changed = (1.0 - ca.exp(float(ca.log(1.0 - total)) * steps)) / total
+    return fail * changed, recover * changed
+
+
+def log_normal(square: Value, variance: Value, rows: int = 1) -> Value:
+    """Return the log density of a normal vector, from its squared distance and the product of its variances."""
+    import casadi as ca
+
+    return -0.5 * (square + ca.log(variance) + rows * float(ca.log(2 * ca.pi)))
+
+
+def log_sum(a: Value, b: Value) -> Value:
+    """Return log(exp a + exp b) without overflow."""
+    import casadi as ca
+
+    return ca.fmax(a, b) + ca.log(1 + ca.exp(-ca.fabs(a - b)))

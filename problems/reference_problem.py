@@ -15,6 +15,7 @@ class ReferenceProblem:
     """One problem: objectives as CasADi expressions of x, its usual start and its least factor.
 
     published : as printed in the source, NaN where it prints none; optimum : re-solved from many starts
+    doubt : where the two differ, what was found out about it; empty where the printed figure reproduces
     options : further arguments of Minimax, or of GoalAttainment where they name goals
     convex : all rows are convex, so that a global proof exists
     """
@@ -27,6 +28,7 @@ class ReferenceProblem:
     source: str
     options: dict[str, Any] = field(default_factory=dict, repr=False)
     convex: bool = False
+    doubt: str = ""
 
     def problem(self, start: ArrayLike | None = None) -> Minimax | GoalAttainment:
         """Return the problem on SX symbols, from its usual start or another (n,)."""

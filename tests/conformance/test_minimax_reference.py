@@ -105,12 +105,13 @@ def test_the_table_from_many_starts(reference: ReferenceProblem) -> None:
 
 
 @pytest.mark.parametrize("reference", REFERENCE, ids=lambda reference: reference.name)
-def test_published_optimum_reproduces(reference: ReferenceProblem) -> None:
-    if math.isnan(reference.published) or reference.name == "Watson":
-        pytest.skip("no optimum is printed, or it was found not to reproduce")
+def test_published_optimum_reproduces_or_is_doubted(reference: ReferenceProblem) -> None:
+    if math.isnan(reference.published):
+        pytest.skip("no optimum is printed")
     digits = len(f"{reference.published!r}".partition("e")[0].replace("-", "").replace(".", "").lstrip("0"))
     size = math.floor(math.log10(abs(reference.published))) if reference.published else 0
-    assert reference.optimum == pytest.approx(reference.published, abs=2 * 10.0 ** (size - digits + 1))
+    reproduces = abs(reference.optimum - reference.published) <= 2 * 10.0 ** (size - digits + 1)
+    assert reproduces == (not reference.doubt)
 
 
 def test_names_are_unique() -> None:

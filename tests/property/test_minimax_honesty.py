@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from minmax_draws import Drawn, convex_problem, nonconvex_problem
+from optsat.problems.reference_draws import Drawn, convex_problem, nonconvex_problem
 
 from optsat.certificates.dual_bound import dual_bound
 from optsat.certificates.first_order import first_order

@@ -43,10 +43,10 @@ def claim_row(claim: Claim) -> tuple[str, str, str, str]:
 
 
 def measured_words(claim: Claim) -> str:
-    """Return the measured figure, with its interval where there is one."""
+    """Return the measured figure, with its interval where there is one, whose ends are known to few digits."""
     if claim.interval is None:
         return figure_words(claim.measured)
-    low, high = (figure_words(end) for end in claim.interval)
+    low, high = (f"{end:.4g}" if math.isfinite(end) else "not finite" for end in claim.interval)
     return f"{figure_words(claim.measured)} ({low} to {high})"
 
 

@@ -63,10 +63,17 @@ def _claims(judged: Sequence[tuple[Reproduction, Claim]]) -> str:
         rows.append(
             f'<tr><td class="says">{says}</td>{printed}{cell("Measured", measured)}'
             f'<td data-label="Verdict">{chip(claim.verdict.value, verdict)}</td>'
-            f'<td class="wide" data-label="Command"><code>{escape(each.run.command)}</code></td></tr>'
+            f'<td class="wide" data-label="Command">{_command(each.run.command)}</td></tr>'
         )
     heads = [name for name in _HEADS if name != "Paper" or judged[0][1].paper is not None]
     return f'<table class="stack">{head(heads)}<tbody>{"".join(rows)}</tbody></table>'
+
+
+def _command(command: str) -> str:
+    """Return a command that breaks between its options only, never between the dashes of one."""
+    first, *options = command.split(" --")
+    kept = "".join(f' <span class="option">--{escape(option)}</span>' for option in options)
+    return f"<code>{escape(first)}{kept}</code>"
 
 
 def _lost(lost: Sequence[Reproduction]) -> str:

@@ -17,29 +17,66 @@ def _print_example(asked: bool) -> None:
         raise typer.Exit
 
 
+def _print_diagnosis_example(asked: bool) -> None:
+    if asked:
+        from optsat.simulation.diagnosis_file import diagnosis_example
+
+        typer.echo(diagnosis_example(), nl=False)
+        raise typer.Exit
+
+
 def simulate_command(
     scenario: Annotated[
         Path, typer.Argument(metavar="SCENARIO.toml", help="The scenario; see --example.", show_default=False)
     ],
     out: Annotated[Path, typer.Option(metavar="LOG", help="The CSV log to write.", show_default=False)],
+    truth: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Where the truth of a diagnosis scenario goes; LOG.truth.csv.", show_default=False
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sensor errors.")] = 0,
     _example: Annotated[
         bool,
         typer.Option(
-            "--example", callback=_print_example, is_eager=True, help="Print a complete scenario file and stop."
+            "--example", callback=_print_example, is_eager=True, help="Print a complete orbit scenario and stop."
+        ),
+    ] = False,
+    _diagnosis_example: Annotated[
+        bool,
+        typer.Option(
+            "--example-diagnosis",
+            callback=_print_diagnosis_example,
+            is_eager=True,
+            help="Print a complete scenario of failing sensors and thrusters and stop.",
         ),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate a satellite with sensors of bounded error and write its log, with the true attitude."""
+    """Simulate a satellite and write its log: direction sensors of bounded error, or sensors and thrusters that fail.
+
+    Example: optsat simulate --example-diagnosis > s1.toml; optsat simulate s1.toml --out s1.csv --seed 1
+    """
+    from optsat.errors import InputError
+    from optsat.simulation.scenario_file import ScenarioKind, kind_of_scenario, parse_scenario, read_text
+
+    text, file = read_text(scenario), str(scenario)
+    if kind_of_scenario(text, file) is ScenarioKind.DIAGNOSIS:
+        from optsat.commands.simulate_diagnosis import simulate_diagnosis
+
+        beside = out.with_name(f"{out.stem}.truth.csv") if truth is None else truth
+        simulate_diagnosis(text, file, out, beside, seed, as_json)
+        return
+    if truth is not None:
+        raise InputError("--truth is for diagnosis scenarios; the log of an orbit scenario holds the true attitude.")
     import numpy as np
 
     from optsat.estimators.series_report import time_spans
     from optsat.records.csv_log import write_csv_log
-    from optsat.simulation.scenario_file import read_scenario
 
     require_folders(out)
-    run = read_scenario(scenario)
+    run = parse_scenario(text, file)
     record = run.simulate(np.random.default_rng(seed))
     write_csv_log(out, record)
     dark = time_spans(record.t, run.in_shadow())

@@ -5,7 +5,7 @@ import io
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from numpy.typing import ArrayLike
@@ -32,13 +32,24 @@ def write_csv_log(path: str | os.PathLike[str], record: Record, frames: Mapping[
     OSError : the folder is missing or cannot be written.
     """
     rotations = {name: finite_array(f"frames[{name!r}]", dcm, (3, 3)) for name, dcm in (frames or {}).items()}
+    write_columns(path, MAGIC, _metadata(record, rotations), _columns(record, rotations))
+
+
+def write_columns(
+    path: str | os.PathLike[str], first_line: str, metadata: Sequence[str], columns: Mapping[str, Array]
+) -> None:
+    """Write columns (T,) by their headings below a first line and TOML lines; what is not finite is an empty cell.
+
+    Raises
+    ------
+    OSError : the folder is missing or cannot be written.
+    """
     text = io.StringIO()
-    text.write(f"{MAGIC}\n")
-    text.writelines(f"# {line}\n" for line in _metadata(record, rotations))
-    columns = _columns(record, rotations)
+    text.write(f"{first_line}\n")
+    text.writelines(f"# {line}\n" for line in metadata)
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(columns)
-    rows.writerows(zip(*(map(cell, values.tolist()) for values in columns.values()), strict=True))
+    rows.writerows(zip(*(map(_cell, values.tolist()) for values in columns.values()), strict=True))
     write_atomically(Path(path), text.getvalue().encode())
 
 
@@ -82,6 +93,5 @@ def _vector_columns(channel: VectorChannel, rotations: Mapping[str, Array]) -> d
     return columns | {f"{channel.name}.bound [rad]": channel.angle_bound_rad}
 
 
-def cell(value: float) -> str:
-    """Return a number with all its digits; a missing one is an empty cell."""
+def _cell(value: float) -> str:
     return repr(value) if math.isfinite(value) else ""

@@ -15,21 +15,17 @@ An empty cell is a missing sample and no fault. A cell that is no finite number 
 `BadRow`. Readings of any size are taken as they are: whether they can be right is what diagnosis decides.
 """
 
-import csv
-import io
 import os
-from pathlib import Path
 
 import numpy as np
 
 from optsat.arrays import Array
 from optsat.errors import RecordError, explain_unknown_options
-from optsat.files import write_atomically
 from optsat.records.csv_gate import Gate, in_time_order
 from optsat.records.csv_layout import DEVICES, MAGIC, Layout, parse_layout
 from optsat.records.csv_log import read_lines
 from optsat.records.csv_table import Table, read_table
-from optsat.records.csv_writer import cell, toml_text
+from optsat.records.csv_writer import toml_text, write_columns
 from optsat.records.record import BadRow
 from optsat.records.telemetry import CHANNELS, Telemetry
 
@@ -108,15 +104,8 @@ def write_telemetry(path: str | os.PathLike[str], telemetry: Telemetry) -> None:
             parts, unit = _parts(device), CHANNELS[field][1]
             grid = values.reshape(len(telemetry), -1)
             columns |= {f"{device}.{part} [{unit}]": grid[:, i] for i, part in enumerate(parts)}
-    text = io.StringIO()
-    text.write(f"{MAGIC}\n")
-    if telemetry.epoch is not None:
-        text.write(f"# epoch = {toml_text(telemetry.epoch)}\n")
-    text.write(f"# source = {toml_text(telemetry.source)}\n")
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(columns)
-    rows.writerows(zip(*(map(cell, values.tolist()) for values in columns.values()), strict=True))
-    write_atomically(Path(path), text.getvalue().encode())
+    metadata = [] if telemetry.epoch is None else [f"epoch = {toml_text(telemetry.epoch)}"]
+    write_columns(path, MAGIC, [*metadata, f"source = {toml_text(telemetry.source)}"], columns)
 
 
 def _parts(device: str) -> tuple[str, ...]:

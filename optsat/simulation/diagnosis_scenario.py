@@ -16,6 +16,7 @@ from optsat.models.schedule import Schedule, constant
 from optsat.models.spacecraft import Spacecraft
 
 _MOST_SAMPLES = 10_000_000
+_DIGITS = 12  # 3 * 0.1 s is 0.3 s in a log
 _NO_FORCE = Schedule((), ())
 
 
@@ -137,7 +138,8 @@ class DiagnosisScenario:
 
     def grid(self) -> Array:
         """Return the times (T,) of the rows before jitter and gaps [s]."""
-        return self.dt * np.arange(math.floor(self.duration / self.dt * (1 + 1e-12)) + 1, dtype=np.float64)
+        count = math.floor(self.duration / self.dt * (1 + 1e-12)) + 1
+        return np.asarray(np.round(self.dt * np.arange(count), _DIGITS))
 
 
 def scenario_s0(tumbling: bool = True) -> DiagnosisScenario:

@@ -4,17 +4,27 @@ import datetime
 import math
 import os
 import tomllib
+from enum import Enum
 from importlib import resources
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from optsat.errors import InputError
+from optsat.errors import InputError, nearest_name
 from optsat.models.draws import ConeLaw
 from optsat.models.epoch import Epoch
 from optsat.simulation.orbit_scenario import GyroError, OrbitScenario, Rate
 from optsat.simulation.sensor_fault import FaultKind, SensorFault
 from optsat.simulation.validation_messages import sentences
+
+Table = TypeVar("Table", bound=BaseModel)
+
+
+class ScenarioKind(Enum):
+    """What a scenario file may describe."""
+
+    ORBIT = "orbit"
+    DIAGNOSIS = "diagnosis"
 
 
 class _Table(BaseModel):
@@ -62,6 +72,7 @@ class _Fault(_Table):
 
 
 class _Scenario(_Table):
+    kind: Literal["orbit"] = "orbit"
     epoch: str | datetime.datetime = "2021-03-20T12:00:00Z"
     duration_s: float = Field(default=1200.0, ge=0, le=1e7)
     dt_s: float = Field(default=1.0, gt=0, le=3600)
@@ -135,13 +146,42 @@ def parse_scenario(text: str, file: str = "scenario") -> OrbitScenario:
     ------
     InputError : as for `read_scenario`.
     """
+    content = validated(_Scenario, text, file)
     try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file}: this is not TOML: {error}.") from None
-    try:
-        return _Scenario.model_validate(content).scenario()
-    except ValidationError as refused:
-        raise InputError("\n".join(f"{file}: {fault}" for fault in sentences(_Scenario, refused))) from None
+        return content.scenario()
     except InputError as refused:
         raise InputError(f"{file}: {refused}") from None
+
+
+def kind_of_scenario(text: str, file: str = "scenario") -> ScenarioKind:
+    """Return what kind of scenario a TOML text is; one that does not say is an orbit scenario.
+
+    Raises
+    ------
+    InputError : not TOML, or an unknown kind.
+    """
+    kind = _toml(text, file).get("kind", ScenarioKind.ORBIT.value)
+    known = [each.value for each in ScenarioKind]
+    if kind not in known:
+        raise InputError(f"{file}: `kind` is {kind!r}.{nearest_name(str(kind), known)}")
+    return ScenarioKind(kind)
+
+
+def validated(model: type[Table], text: str, file: str) -> Table:
+    """Return the entries of a TOML text as its model has them; `file` is what messages call it.
+
+    Raises
+    ------
+    InputError : not TOML, or entries that do not fit the model, one line for each.
+    """
+    try:
+        return model.model_validate(_toml(text, file))
+    except ValidationError as refused:
+        raise InputError("\n".join(f"{file}: {fault}" for fault in sentences(model, refused))) from None
+
+
+def _toml(text: str, file: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{file}: this is not TOML: {error}.") from None

@@ -6,6 +6,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 _BRANCHES = frozenset({"str", "datetime"})  # pydantic names the alternative it tried as if it were an entry
+_SIGNS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
 _KINDS = {"boolean": "true or false", "string": "a text", "array": "a list", "object": "a table"}
 
 
@@ -21,7 +22,8 @@ def sentences(model: type[BaseModel], refused: ValidationError) -> list[str]:
         elif error["type"] == "missing":
             found.append(f"`{where}` is missing; it must be {_allowed(_node(schema, path))}.")
         else:
-            found.append(f"`{where}` must be {_allowed(_node(schema, path))}, got {_shown(error['input'])}.")
+            node, given = _node(schema, path), error["input"]
+            found.append(f"`{where}` must be {_allowed(node)}, got {_shown(given)}.{_meant_word(node, given)}")
     return list(dict.fromkeys(found))
 
 
@@ -60,11 +62,20 @@ def _reference(entry: dict[str, Any]) -> str:
 def _allowed(node: dict[str, Any]) -> str:
     if "enum" in node:
         return "one of " + ", ".join(f'"{word}"' for word in node["enum"])
-    if node.get("type") != "number":
-        return " or ".join(_KINDS.get(n.get("type", ""), "a value") for n in node.get("anyOf", [node])[:1])
-    signs = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
-    limits = [f"{sign} {node[key]:g}" for key, sign in signs.items() if key in node]
-    return " ".join(["a number", " and ".join(limits)]).strip()
+    if node.get("type") == "array" and (count := node.get("minItems")) == node.get("maxItems") is not None:
+        return f"a list of {count} numbers"
+    if node.get("anyOf"):
+        node = {**node["anyOf"][0], **{key: node[key] for key in _SIGNS if key in node}}
+    if node.get("type") not in ("number", "integer"):
+        return _KINDS.get(node.get("type", ""), "a value")
+    limits = [f"{sign} {node[key]:g}" for key, sign in _SIGNS.items() if key in node]
+    number = "a whole number" if node["type"] == "integer" else "a number"
+    return " ".join([number, " and ".join(limits)]).strip()
+
+
+def _meant_word(node: dict[str, Any], given: object) -> str:
+    near = difflib.get_close_matches(str(given), node.get("enum", ()), n=1, cutoff=0.6)
+    return f' Did you mean "{near[0]}"?' if near else ""
 
 
 def _shown(value: object) -> str:

@@ -6,6 +6,7 @@ import tempfile
 import warnings
 from collections.abc import Iterator, Mapping
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 VARIABLE = "OPTSAT_CACHE"
@@ -46,14 +47,15 @@ def searched_folders() -> Iterator[Path]:
     for folder in shared_folders():
         if is_safe(folder, shared=True):
             yield folder
-    for folder in (own_folder(), *spare_folders()):
+    # the spare ones unasked cost a file: the folder of temporary files is found by writing to it
+    for folder in chain((own_folder(),), spare_folders()):
         if is_safe(folder):
             yield folder
 
 
 def writable_folders() -> Iterator[Path]:
     """Yield folders to keep a kernel in, made where they are missing; the later ones for when the earlier fail."""
-    for folder in (own_folder(), *spare_folders()):
+    for folder in chain((own_folder(),), spare_folders()):
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError:

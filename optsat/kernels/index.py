@@ -3,6 +3,10 @@
 A note names the files that the definition could depend on: the modules that were loaded when it was built, of optsat
 and of the definition's own package, and those that tell the versions of CasADi and NumPy. It holds as long as none of
 them changed. FOLDER/index/REQUEST/MACHINE.json; which machine and compiler is part of the name.
+
+A note is two lines of JSON. The first holds the key and the files outside optsat, looked at for each kernel; the second
+the files of optsat, looked at once in a process, as a process whose installation changes has to start again anyway.
+The compiler is looked for once too, and again when the environment changes.
 """
 
 import contextlib
@@ -11,6 +15,7 @@ import json
 import os
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +27,7 @@ from optsat.kernels.request import Request
 from optsat.kernels.toolchain import CompilerMissingError, find_compiler
 from optsat.kernels.unit import ABI
 
+_HOME = os.path.join(os.path.dirname(os.path.dirname(__file__)), "")
 _LIBRARIES = ("casadi", "casadi.casadi", "casadi._casadi", "numpy")
 
 
@@ -38,12 +44,15 @@ def find_key(wanted: Request) -> str | None:
 
 def note_key(wanted: Request, key: str) -> None:
     """Remember the key of a request that was just built in this process; where nothing can be written, do not."""
-    document = {"key": key, "files": [_described(path) for path in _files(wanted)]}
+    files = [_described(path) for path in _files(wanted)]
+    document = {"key": key, "files": [each for each in files if not each[0].startswith(_HOME)]}
+    installed = [each for each in files if each[0].startswith(_HOME)]
+    note = json.dumps(document).encode() + b"\n" + json.dumps(installed).encode()
     for folder in writable_folders():
         place = folder / "index" / _request_name(wanted)
         try:
             place.mkdir(mode=0o700, parents=True, exist_ok=True)
-            write_atomically(place / f"{_machine_name() or 'any'}.json", json.dumps(document).encode(), mode=0o600)
+            write_atomically(place / f"{_machine_name() or 'any'}.json", note, mode=0o600)
             return
         except OSError:
             continue
@@ -60,12 +69,23 @@ def _candidates(place: Path, machine: str) -> Iterator[Path]:
 
 def _key_of(note: Path) -> str | None:
     try:
-        document = json.loads(note.read_bytes())
+        first, _, installed = note.read_bytes().partition(b"\n")
+        document = json.loads(first)
         key: str = document["key"]
-        fresh = all(_is_unchanged(*described) for described in document["files"])
+        fresh = _is_of_this_installation(installed) and all(_is_unchanged(*each) for each in document["files"])
     except (OSError, ValueError, TypeError, KeyError):
         return None
     return key if fresh else None
+
+
+@cache
+def _is_of_this_installation(described: bytes) -> bool:
+    return all(_was_unchanged(*each) for each in json.loads(described))
+
+
+@cache
+def _was_unchanged(path: str, size: int, time: int, digest: str) -> bool:
+    return _is_unchanged(path, size, time, digest)
 
 
 def _is_unchanged(path: str, size: int, time: int, digest: str) -> bool:
@@ -109,6 +129,12 @@ def _request_name(wanted: Request) -> str:
 
 
 def _machine_name() -> str:
+    # what `find_compiler` reads
+    return _machine_of(*(os.environ.get(name) for name in ("CC", "OPTSAT_CFLAGS", "PATH")))
+
+
+@cache
+def _machine_of(*_environment: str | None) -> str:
     try:
         compiler = compiler_identity(find_compiler())
     except CompilerMissingError:

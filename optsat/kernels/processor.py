@@ -3,7 +3,7 @@
 import hashlib
 import os
 import platform
-import re
+import sys
 from functools import cache
 
 import numpy as np
@@ -26,13 +26,16 @@ class DenormalsFlushedError(OptsatError):
 def features() -> frozenset[str]:
     """Return the instruction sets of this processor as the operating system names them; empty where it does not say."""
     try:
-        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as stream:
+        with open("/proc/cpuinfo", "rb") as stream:
             # the first processor stands for all; the whole file takes long on a large machine
-            text = stream.read(8192)
+            text = stream.read(8192).decode("ascii", "replace")
     except OSError:
         return frozenset()
-    found = re.search(r"^(?:flags|Features)\s*:(.*)$", text, re.MULTILINE)
-    return frozenset(found[1].split()) - frozenset(_NO_INSTRUCTIONS.split()) if found else frozenset()
+    for line in text.splitlines():
+        name, _, words = line.partition(":")
+        if name.rstrip() in ("flags", "Features"):
+            return frozenset(words.split()) - frozenset(_NO_INSTRUCTIONS.split())
+    return frozenset()
 
 
 @cache
@@ -64,7 +67,7 @@ def check_denormals() -> None:
     ------
     DenormalsFlushedError : some library has switched them off, as those linked with -ffast-math do.
     """
-    smallest, tiny = np.array([5e-324]), np.array([np.finfo(float).tiny])
+    smallest, tiny = np.array([5e-324]), np.array([sys.float_info.min])
     if (smallest * 2.0**100)[0] == 0.0 or (tiny * 0.5)[0] == 0.0:
         raise DenormalsFlushedError(
             "The processor replaces denormal numbers by zero, so results would differ in their last bits: a library in "

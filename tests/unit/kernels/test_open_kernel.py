@@ -7,12 +7,13 @@ import pickle
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from kernel_examples import bits, equations, needs_compiler, samples, turning, use_form
+from kernel_examples import bits, equations, forget, needs_compiler, samples, turning, use_form
 
 from optsat.errors import InputError
 from optsat.kernels import folders, index, open_kernel, processor
@@ -25,13 +26,21 @@ HERE = str(Path(__file__).parent)
 
 
 @pytest.fixture(autouse=True)
-def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache; definitions can be imported here and in other processes."""
     needs_compiler()
     monkeypatch.setenv(folders.VARIABLE, str(tmp_path / "own"))
     monkeypatch.setenv("OPTSAT_CFLAGS", "-O0")
     monkeypatch.syspath_prepend(HERE)
-    return tmp_path / "own"
+    forget_what_was_seen()
+    yield tmp_path / "own"
+    monkeypatch.undo()
+    forget_what_was_seen()
+
+
+def forget_what_was_seen() -> None:
+    """As in a new process."""
+    forget(index._machine_of, index._was_unchanged, index._is_of_this_installation)
 
 
 def opened(name: str, **options: Any) -> Kernel:
@@ -110,13 +119,17 @@ def test_a_changed_file_makes_it_built_again(own: Path, tmp_path: Path, monkeypa
     built = count_builds(monkeypatch)
     opened("turned")
     (note,) = notes(own)
-    document = json.loads(note.read_bytes())
+    first, installed = note.read_bytes().splitlines()
+    document = json.loads(first)
     names = {Path(path).name for path, *_ in document["files"]}
+    assert {"kernel_definitions.py", "casadi.py"} <= names
+    assert not {"generated_function.py", "os_rt.h"} & names
+    names |= {Path(path).name for path, *_ in json.loads(installed)}
     assert {"kernel_definitions.py", "generated_function.py", "os_rt.h", "casadi.py", "cholesky_solve.c"} <= names
     copy = tmp_path / "file.py"
     copy.write_text("a = 1\n")
     document["files"].append(index._described(str(copy)))
-    note.write_text(json.dumps(document))
+    note.write_bytes(json.dumps(document).encode() + b"\n" + installed)
     opened("turned")
     assert len(built) == 1
     os.utime(copy, (1, 1))  # another time, the same text
@@ -127,7 +140,42 @@ def test_a_changed_file_makes_it_built_again(own: Path, tmp_path: Path, monkeypa
     assert len(built) == 2
 
 
-@pytest.mark.parametrize("damage", [b"", b"{", b'{"key": "ab"}', b'{"key": "00", "files": []}', b"[]"])
+def test_files_of_optsat_are_looked_at_once_in_a_process(
+    own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(index, "_HOME", str(tmp_path))
+    part = tmp_path / "part.py"
+    part.write_text("a = 1\n")
+    monkeypatch.setattr(index, "_files", lambda _wanted: [str(part)])
+    built = count_builds(monkeypatch)
+    opened("turned")
+    (note,) = notes(own)
+    assert json.loads(note.read_bytes().splitlines()[0])["files"] == []
+    opened("turned")
+    part.write_text("a = 2, longer\n")
+    opened("turned")
+    assert len(built) == 1
+    forget_what_was_seen()
+    opened("turned")
+    assert len(built) == 2
+    # what was written since is a file of its own, and holds from now on
+    opened("turned")
+    assert len(built) == 2
+
+
+def test_the_compiler_is_looked_for_again_in_another_environment(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    key = opened("turned").record.key
+    monkeypatch.setenv("CC", "/nonexistent")
+    assert opened("turned").record.key == key
+    monkeypatch.delenv("CC")
+    monkeypatch.setenv("OPTSAT_CFLAGS", "-O0 -DOTHER")
+    assert opened("turned").record.key != key
+    assert len(notes(own)) == 2
+
+
+@pytest.mark.parametrize(
+    "damage", [b"", b"{", b'{"key": "ab"}', b'{"key": "00", "files": []}\n[]', b"[]", b"[]\n[]", b"{}\n[[]]"]
+)
 def test_a_damaged_note_is_as_none(damage: bytes, own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     key = opened("turned").record.key
     (note,) = notes(own)
@@ -142,6 +190,7 @@ def test_another_machine_or_compiler_has_a_note_of_its_own(own: Path, monkeypatc
     monkeypatch.setenv("OPTSAT_CFLAGS", "-O0 -DOTHER")
     opened("turned")
     monkeypatch.setattr(index, "identity", lambda: "another")
+    forget_what_was_seen()
     opened("turned")
     assert len(notes(own)) == 3
 
@@ -153,6 +202,7 @@ def test_without_a_compiler_what_is_there_is_used(own: Path, monkeypatch: pytest
         raise CompilerMissingError("No C compiler, says this test.")
 
     monkeypatch.setattr(index, "find_compiler", missing)
+    forget_what_was_seen()
     kernel = opened("turned")
     assert kernel.is_compiled
     assert kernel.record.key == key

@@ -25,7 +25,7 @@ from optsat.kernels.open_kernel import make_kernel
 VECTORS = (2, 3, 4, 6)
 BOUNDS_DEG = (5.0, 0.5, 0.05, 0.005)
 _MOST = max(VECTORS)
-_OK = 0
+_OK, _INCONSISTENT = 0, 2
 
 
 @functools.cache
@@ -39,7 +39,7 @@ def run(case: Case, rng: np.random.Generator) -> Row:
     m = case["vectors"]
     q_BN, b_B, r_N, eps = (part[0] for part in poses(Draws.of_case(rng), np.deg2rad([case["bound_deg"]])))
     found, bound, _, status = kernel(m)(b_B[:m].copy(), r_N[:m].copy(), eps[:m].copy())[:4]
-    return {"status": int(status), **_judged(found, q_BN, np.asarray(bound))}
+    return {"answer": int(status), **_judged(found, q_BN, np.asarray(bound))}
 
 
 def run_batch(cases: Columns, draws: Draws) -> Columns:
@@ -51,7 +51,7 @@ def run_batch(cases: Columns, draws: Draws) -> Columns:
         own = np.flatnonzero(cases["vectors"] == m)
         results = kernel(int(m)).batch(*(np.ascontiguousarray(part[own, :m]) for part in (b_B, r_N, eps)))
         found[own], bound[own], status[own] = results[0], results[1], results[3]
-    return {"status": status, **_judged(found, q_BN, bound)}
+    return {"answer": status, **_judged(found, q_BN, bound)}
 
 
 def poses(draws: Draws, eps: Array) -> tuple[Array, Array, Array, Array]:
@@ -93,8 +93,8 @@ def metrics(rows: Sequence[Row]) -> Mapping[str, float]:
     answered = refused = violations = 0
     largest = total = 0.0
     for row in rows:
-        if row["status"] != _OK:
-            refused += row["status"] == 2
+        if row["answer"] != _OK:
+            refused += row["answer"] == _INCONSISTENT
             continue
         answered += 1
         violations += row["ratio"] > 1.0

@@ -1,6 +1,6 @@
 """Case runs: the cases of one chunk, one after the other or as a batch, and what becomes of those that raise."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from optsat.errors import InputError, OptsatError
 # What a computation may raise on unlucky data. Anything else (a TypeError, a misspelt name) is a mistake in the
 # study and stops the campaign with its traceback.
 _CASE_ERRORS = (OptsatError, ArithmeticError, ValueError, RuntimeError)
+_RESERVED = frozenset(("case", "status", "failure"))
 _PLAIN = (float, int, bool, str)
 _KINDS = {"b": np.bool_, "i": np.int64, "u": np.int64, "f": np.float64, "U": np.str_}
 
@@ -49,9 +50,19 @@ def _outcome(study: Study, key: int, number: int, case: Case) -> Row | Failure:
         row = study.run(case, case_generator(key, number))
     except _CASE_ERRORS as error:
         return Failure(number, type(error).__name__, str(error))
+    _check_names(study, row)
     if all(type(value) in _PLAIN for value in row.values()):
         return {"case": number, **row}
     return {"case": number, **{name: _value(study, number, name, value) for name, value in row.items()}}
+
+
+def _check_names(study: Study, names: Collection[str]) -> None:
+    if not _RESERVED.isdisjoint(names):
+        taken = ", ".join(f"`{name}`" for name in sorted(_RESERVED.intersection(names)))
+        raise InputError(
+            f"study {study.name} returns {taken}, under which the result keeps the number of a case, whether it failed "
+            "and why. Give it another name."
+        )
 
 
 def _value(study: Study, number: int, name: str, value: object) -> object:
@@ -84,6 +95,7 @@ def _append_batch(study: Study, layout: Layout, numbers: Sequence[int], parts: l
 
 
 def _columns(study: Study, count: int, found: Columns) -> Columns:
+    _check_names(study, found)
     columns: dict[str, NDArray[Any]] = {}
     for name, values in found.items():
         column = np.asarray(values)

@@ -40,7 +40,7 @@ def test_the_poses_are_admissible_and_the_bounds_those_of_the_array_path() -> No
     for k in range(16):
         m = int(columns["vectors"][k])
         attitude = certify_attitude(b_B[k, :m], r_N[k, :m], eps[k, :m], norm_policy="silent")
-        assert found["status"][k] == 0
+        assert found["answer"][k] == 0
         assert np.deg2rad(found["bound_deg"][k]) <= attitude.bound_rad * 1.01
         assert np.linalg.norm(q_BN[k]) == pytest.approx(1.0)
     assert np.max(found["ratio"]) > 0.5, "errors on the boundary come close to the bound"

@@ -86,6 +86,15 @@ def test_rows_hold_scalars_and_arrays_of_numbers_only() -> None:
         run_study(_variant(run=lambda case, _rng: {"q_BN": np.zeros(1 + int(case["offset"]))}), cases=2, workers=1)
 
 
+@pytest.mark.parametrize("name", ["case", "status", "failure"])
+def test_names_that_the_result_needs_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match=f"returns `{name}`, under which the result keeps"):
+        run_study(_variant(run=lambda _case, _rng: {"a": 1.0, name: 0}))
+    batch = _variant(run_batch=lambda _cases, draws: {name: np.zeros(draws.cases)})
+    with pytest.raises(InputError, match=f"returns `{name}`, under which the result keeps"):
+        run_study(batch)
+
+
 def test_columns_must_agree() -> None:
     def run(case: Case, _rng: np.random.Generator) -> dict[str, float]:
         return {"b" if case["offset"] == 2.0 else "a": 0.0}

@@ -58,9 +58,11 @@ def attitude_bank_model(bank: AttitudeBank) -> BankModel:
         reference=symbols.reference_ports,
         carried=symbols.carried_ports,
         inputs=symbols.input_ports,
+        samples=symbols.samples,
         faults=bank.bits,
-        channels=bank.channels,
         states=symbols.names,
+        spread=(*[bank.attitude_prior] * 3, *[bank.rate_prior] * 3, *[bank.bias_prior] * (3 * symbols.has_bias)),
+        sample_time=bank.sample_time,
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from optsat.attitude.backend import Value
 from optsat.errors import InputError
+from optsat.estimators.bank_samples import BankSamples
 from optsat.kernels.hypothesis_bank import BankStructure, hypothesis_bank
 from optsat.kernels.source import KernelSource
 from optsat.models.parts import Part
@@ -19,8 +20,10 @@ Fault = tuple[Part, ...]
 class BankModel:
     """The functions and ports of `optsat.kernels.hypothesis_bank.hypothesis_bank`, with what its bits and states mean.
 
-    faults : parts of each bit; channels : part of each channel, in the order of use
+    samples : what its devices send; faults : parts of each bit
     states : names of the error states with their units
+    spread : deviation of each state that no actuator drives, at the start and after a long gap
+    sample_time : that noises and chances per step belong to [s]
     """
 
     structure: BankStructure
@@ -30,9 +33,11 @@ class BankModel:
     reference: tuple[Port, ...]
     carried: tuple[Port, ...]
     inputs: tuple[Port, ...]
+    samples: BankSamples
     faults: tuple[Fault, ...]
-    channels: tuple[Part, ...]
     states: tuple[str, ...]
+    spread: tuple[float, ...]
+    sample_time: float
 
     def kernel_source(self, name: str, floor: float = 1e-60) -> KernelSource:
         """Return the kernel of one step.
@@ -104,17 +109,3 @@ def chain_over(fail: float, recover: float, steps: Value) -> tuple[Value, Value]
     total = fail + recover
     changed = (1.0 - ca.exp(float(ca.log(1.0 - total)) * steps)) / total
     return fail * changed, recover * changed
-
-
-def log_normal(square: Value, variance: Value, rows: int = 1) -> Value:
-    """Return the log density of a normal vector, from its squared distance and the product of its variances."""
-    import casadi as ca
-
-    return -0.5 * (square + ca.log(variance) + rows * float(ca.log(2 * ca.pi)))
-
-
-def log_sum(a: Value, b: Value) -> Value:
-    """Return log(exp a + exp b) without overflow."""
-    import casadi as ca
-
-    return ca.fmax(a, b) + ca.log(1 + ca.exp(-ca.fabs(a - b)))

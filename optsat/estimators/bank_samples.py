@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from optsat.attitude.backend import Value
-from optsat.estimators.bank_model import log_normal, log_sum
 from optsat.models.parts import Part
 from optsat.port import Port
 
@@ -121,3 +120,17 @@ def exact_density(sensor: Sensor, seen: Value) -> Value:
         return frozen
     dead = quarter + log_normal(ca.sum1(sensor.value**2 / variances), volume, rows)
     return log_sum(dead, frozen)
+
+
+def log_normal(square: Value, variance: Value, rows: int = 1) -> Value:
+    """Return the log density of a normal vector, from its squared distance and the product of its variances."""
+    import casadi as ca
+
+    return -0.5 * (square + ca.log(variance) + rows * float(ca.log(2 * ca.pi)))
+
+
+def log_sum(a: Value, b: Value) -> Value:
+    """Return log(exp a + exp b) without overflow."""
+    import casadi as ca
+
+    return ca.fmax(a, b) + ca.log(1 + ca.exp(-ca.fabs(a - b)))

@@ -1,6 +1,6 @@
 """The specification's attitude bank in plain NumPy, on `dense_bank`: quaternions scalar first, body to inertial."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from dense_bank import DenseChannel, Drive, Modes, Outcome, dense_step, normal, transition
@@ -16,7 +16,7 @@ class Parameters:
     axes: int = 3
     T: float = 0.1
     gyro: float = 0.01
-    star: Array = 4e-7 * np.array([2.29, 1.95, 3.85])
+    star: Array = field(default_factory=lambda: 4e-7 * np.array([2.29, 1.95, 3.85]))
     Qw: float = 1e-6
     sensor: tuple[float, float] = (2e-4, 5e-3)
     thruster: tuple[float, float] = (1e-3, 1e-2)
@@ -27,11 +27,11 @@ def product(a: Array, b: Array) -> Array:
 
 
 def conjugate(q: Array) -> Array:
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.array([q[0], -q[1], -q[2], -q[3]])
 
 
 def skew(v: Array) -> Array:
-    return np.asarray(np.cross(np.eye(3), -v))
+    return np.asarray(np.cross(np.eye(3), v))
 
 
 def exponential(theta: Array) -> Array:
@@ -60,6 +60,13 @@ def runge_kutta(q: Array, w: Array, torque: Array, J: Array, T: float) -> tuple[
     return q / np.linalg.norm(q), w + T / 6 * (a[1] + 2 * b[1] + 2 * c[1] + d[1])
 
 
+def over(chain: tuple[float, float], steps: float) -> tuple[float, float]:
+    """Chances to fail and to recover over a number of steps: the power of the chain's matrix."""
+    values, vectors = np.linalg.eig(np.array([[1.0 - chain[0], chain[0]], [chain[1], 1.0 - chain[1]]]))
+    matrix = vectors @ np.diag(values**steps) @ np.linalg.inv(vectors)
+    return max(float(matrix[0, 1]), 0.0), max(float(matrix[1, 0]), 0.0)
+
+
 class DenseAttitude:
     """The bank from one sample to the next; `axes` 3 or 0 thruster axes, which may fail."""
 
@@ -68,24 +75,25 @@ class DenseAttitude:
         self.command = command
         self.gyro: list[float | None] = [None, None, None]
         self.star: Array | None = None
-        self.matrix = transition([p.sensor] * 4 + [p.thruster] * p.axes)
+        self.dt = p.T
 
     def step(self, command: Array, gyro: Array, star: Array) -> Outcome:
         """One sample of each sensor; NaN in a gyro axis or in the star tracker is a missing one."""
-        p, n = self.p, 6 + self.p.axes
+        p, n, T = self.p, 6 + self.p.axes, self.dt
+        chains = [over(each, T / p.T) for each in [p.sensor] * 4 + [p.thruster] * p.axes]
         torque = command + np.append(self.d, np.zeros(3 - p.axes))
-        q, w = runge_kutta(self.q, self.w, torque, p.J, p.T)
+        q, w = runge_kutta(self.q, self.w, torque, p.J, T)
         middle = (w + self.w) / 2
         A = np.zeros((n, n))
         A[:3, :3], A[:3, 3:6] = -skew(middle), np.eye(3)
         A[3:6, 3:6] = np.linalg.solve(p.J, skew(p.J @ middle) - skew(middle) @ p.J)
         A[3:6, 6:] = np.linalg.inv(p.J)[:, : p.axes]
-        AT = A * p.T
+        AT = A * T
         F = np.eye(n) + AT + AT @ AT / 2 + AT @ AT @ AT / 6
-        Q = np.array([0.0] * 3 + [p.Qw] * 3 + [0.0] * p.axes)
+        Q = np.array([0.0] * 3 + [p.Qw * T / p.T] * 3 + [0.0] * p.axes)
         jump = command - self.command
-        drives = [Drive(6 + i, 4 + i, 36.0, -self.d[i], jump[i], 0.01) for i in range(p.axes)]
-        found = dense_step(self.modes, self.matrix, F, Q, drives, self.channels(q, w, gyro, star))
+        drives = [Drive(6 + i, 4 + i, 36.0, -self.d[i], jump[i], 0.01 * T / p.T) for i in range(p.axes)]
+        found = dense_step(self.modes, transition(chains), F, Q, drives, self.channels(q, w, gyro, star))
         self.modes, self.command = found.modes, command
         self.q = product(q, exponential(found.merged[:3]))
         self.q = self.q / np.linalg.norm(self.q) * (1.0 if self.q[0] >= 0.0 else -1.0)
@@ -112,14 +120,14 @@ class DenseAttitude:
         found.append(DenseChannel(3, z, H[:3], p.star, free, 0.3, kind))
         last = self.gyro
         for i in range(3):
-            y, s2 = gyro[i], (1e-3 * p.gyro) ** 2
+            missing = bool(np.isnan(gyro[i]))
+            y, s2 = 0.0 if missing else gyro[i], (1e-3 * p.gyro) ** 2
             free = np.log(0.25) + normal(y, s2)
             before = last[i]
             if before is not None:
                 free = np.logaddexp(free, np.log(0.25) + normal(y - before, 2.0 * s2))
             R = np.array([p.gyro**2])
-            missing = bool(np.isnan(y))
-            z = np.array([0.0 if missing else y - w[i]])
+            z = np.array([y - w[i]])
             found.append(DenseChannel(i, z, H[3 + i : 4 + i], R, free, 0.3, 0 if missing else 1))
         self.gyro = [b if np.isnan(a) else float(a) for a, b in zip(gyro, last, strict=True)]
         return found

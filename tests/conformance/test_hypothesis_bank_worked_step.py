@@ -9,7 +9,8 @@ from dense_bank import DenseChannel, Drive, Modes, Outcome, dense_step, normal, 
 from kernel_source_harness import compiled
 
 from optsat.arrays import Array
-from optsat.estimators.bank_model import chain_over, log_normal, log_sum, pattern_of
+from optsat.estimators.bank_model import chain_over, pattern_of
+from optsat.estimators.bank_samples import log_normal, log_sum
 from optsat.kernels.hypothesis_bank import BankStructure, Channel, hypothesis_bank
 from optsat.kernels.source import KernelSource
 from optsat.port import Port

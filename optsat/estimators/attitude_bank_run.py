@@ -1,0 +1,146 @@
+"""Attitude bank run: faults, attitude and torques from the telemetry of one or many spacecraft."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from optsat.arrays import Array, Mask, finite_array
+from optsat.errors import InputError
+from optsat.estimators.attitude_bank import AttitudeBank
+from optsat.estimators.attitude_bank_model import attitude_bank_model
+from optsat.estimators.bank_model import BankModel
+from optsat.estimators.bank_result import BankResult
+from optsat.estimators.bank_run import run_bank, sorted_samples
+from optsat.kernels.kernel import Kernel
+from optsat.kernels.open_kernel import make_kernel
+from optsat.models.parts import PRESSURE
+from optsat.records.telemetry import Telemetry
+
+
+class AttitudeBankFilter:
+    """A bank compiled, or taken from the cache, ready to run on logs and sample by sample.
+
+    bank : its parameters; model : its functions; kernel : one step, which takes and gives arrays by the names of its
+    ports and may be called with many runs at once
+    """
+
+    def __init__(self, bank: AttitudeBank | None = None) -> None:
+        """bank : the defaults unless given."""
+        self.bank = AttitudeBank() if bank is None else bank
+        self.model: BankModel = attitude_bank_model(self.bank)
+        self.kernel: Kernel = make_kernel(self.model.kernel_source(f"attitude_bank_{self.model.structure.modes}"))
+
+    def start(self, q_BN: ArrayLike, omega_BN_B: ArrayLike, command_B: ArrayLike) -> dict[str, Array]:
+        """Return the state of N runs before their first sample, by the names of the kernel's ports.
+
+        q_BN : (N, 4) [-]; omega_BN_B : (N, 3) [rad/s], both known to the priors of the bank
+        command_B : (N, 3) torque commanded until then [N m]
+
+        Raises
+        ------
+        InputError : other shapes, not finite, or a quaternion that is not of length 1.
+        """
+        q = finite_array("q_BN", q_BN, (None, 4))
+        omega, command = (
+            finite_array(name, value, (len(q), 3), unit)
+            for name, value, unit in (("omega_BN_B", omega_BN_B, "rad/s"), ("command_B", command_B, "N m"))
+        )
+        length = np.linalg.norm(q, axis=-1)
+        if (np.abs(length - 1.0) > 1e-6).any():
+            row = int(np.argmax(np.abs(length - 1.0)))
+            raise InputError(f"`q_BN` must be unit quaternions (scalar last): row {row} has length {length[row]:.6g}.")
+        structure, runs = self.model.structure, len(q)
+        failed = np.arange(structure.modes) >> np.arange(structure.bits)[:, None] & 1 == 1
+        prior = np.where(failed, self.bank.fault_prior, 1.0 - self.bank.fault_prior).prod(axis=0)
+        covariance = np.zeros((structure.packed, structure.modes))
+        for e, deviation in enumerate(self.model.spread):
+            covariance[e * (e + 1) // 2 + e] = deviation**2
+        for a, (bit, variance) in enumerate(structure.actuated):
+            e = structure.states - len(structure.actuated) + a
+            covariance[e * (e + 1) // 2 + e] = np.where(failed[bit], variance, 0.0)
+        known = {
+            "probability": prior,
+            "covariance": covariance,
+            "q_BN": q / length[:, None],
+            "omega_BN_B": omega,
+            "last_star_BN": np.array([0.0, 0.0, 0.0, 1.0]),
+            "last_command_B": command,
+        }
+        ports = self.kernel.record.inputs[: len(self.kernel.record.inputs) - len(self.model.inputs)]
+        return {
+            port.name: np.broadcast_to(known.get(port.name, np.zeros(port.shape)), (runs, *port.shape)).copy()
+            for port in ports
+        }
+
+    def run(
+        self,
+        telemetry: Telemetry | Sequence[Telemetry],
+        q_BN: ArrayLike | None = None,
+        omega_BN_B: ArrayLike | None = None,
+        keep_modes: bool = True,
+    ) -> BankResult:
+        """Return what the bank finds in one log, or in N logs of equally many rows.
+
+        q_BN : (4,) or (N, 4), omega_BN_B : (3,) or (N, 3) [rad/s] : at the first row, as well known as the bank's
+        priors say; unless given, those that star tracker and gyro send there
+        keep_modes : whether the result holds the probability of every mode at every row
+
+        Raises
+        ------
+        InputError : the logs differ in length or lack a sensor of the bank, or the first row has no valid sample to
+            start from. BankFailedError : a number is beyond all measure.
+        """
+        logs = [telemetry] if isinstance(telemetry, Telemetry) else list(telemetry)
+        if not logs or len({len(log) for log in logs}) != 1:
+            raise InputError(f"Logs that run together must have equally many rows, got {[len(log) for log in logs]}.")
+        samples = sorted_samples(self.model, {name: self._stacked(logs, name) for name in self._arrays()})
+        command = np.stack([log.command_torque_B for log in logs])
+        first = self._first(samples.values, samples.received[:, 0] & ~samples.invalid[:, 0], q_BN, omega_BN_B)
+        # a row's command acts from then on, so that up to the next row is the one before
+        held = {"command_B": np.concatenate([command[:, :1], command[:, :-1]], axis=1)}
+        state = self.start(*first, command[:, 0])
+        return run_bank(self.model, self.kernel, state, np.stack([log.t for log in logs]), held, samples, keep_modes)
+
+    def _arrays(self) -> dict[str, str]:
+        """Return the array of the telemetry that each port of samples takes."""
+        known = {
+            "star_BN": "star_q_BN",
+            "gyro_B": "gyro_omega_BN_B",
+            "skewed_gyro": "skewed_gyro_rate",
+            "pressure_B": "pressure_torque_B",
+        }
+        return {device.port.name: known[device.port.name] for device in self.model.samples.devices}
+
+    def _stacked(self, logs: Sequence[Telemetry], port: str) -> Array:
+        name = self._arrays()[port]
+        for number, log in enumerate(logs):
+            if getattr(log, name) is None:
+                raise InputError(
+                    f"Log {number} has no `{name}`, which the bank needs. Give it rows of NaN, or leave that sensor "
+                    "out of the bank."
+                )
+        found = np.stack([np.asarray(getattr(log, name)).reshape(len(log), -1) for log in logs])
+        if port == "pressure_B":
+            found = found[..., [PRESSURE.index(part) for part in self.bank.channels if part in PRESSURE]]
+        return found
+
+    def _first(
+        self, values: dict[str, Array], usable: Mask, q_BN: ArrayLike | None, omega_BN_B: ArrayLike | None
+    ) -> tuple[Array, Array]:
+        runs, channels = len(usable), self.model.samples.channels
+        star, gyro = values["star_BN"][:, 0], values["gyro_B"][:, 0]
+        for name, given, columns in (("q_BN", q_BN, slice(0, 1)), ("omega_BN_B", omega_BN_B, slice(1, 4))):
+            if given is None and not usable[:, columns].all():
+                run = int(np.argmax(~usable[:, columns].all(axis=1)))
+                parts = ", ".join(part.value for part in channels[columns])
+                raise InputError(f"Row 0 of log {run} has no valid sample of {parts}; give `{name}` at the first row.")
+        q = star / np.linalg.norm(star, axis=-1, keepdims=True) if q_BN is None else _rows("q_BN", q_BN, runs, 4)
+        return q, gyro if omega_BN_B is None else _rows("omega_BN_B", omega_BN_B, runs, 3)
+
+
+def _rows(name: str, value: ArrayLike, runs: int, width: int) -> Array:
+    array = finite_array(name, value)
+    if array.shape not in ((width,), (runs, width)):
+        raise InputError(f"`{name}` must have shape ({width},) or ({runs}, {width}), got {array.shape}.")
+    return np.broadcast_to(array, (runs, width)).copy()

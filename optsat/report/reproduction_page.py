@@ -1,5 +1,6 @@
 """Reproduction page: per published claim whether it is reproduced, with the figure and the command."""
 
+import itertools
 from collections.abc import Sequence
 from html import escape
 
@@ -9,7 +10,6 @@ from optsat.report import content
 from optsat.report.html_report import cell, chip, facts, head
 from optsat.report.page import page
 
-_HEADS = ("Claim", "Paper", "Measured", "Verdict", "Command")
 _TITLE = "What reproduces, and what does not"
 REPORT = "report.html"
 
@@ -55,18 +55,29 @@ def _section(heading: str, inside: str) -> str:
 
 
 def _claims(judged: Sequence[tuple[Reproduction, Claim]]) -> str:
-    rows = []
-    for each, claim in judged:
-        says, paper, measured, verdict = (escape(word) for word in content.claim_row(claim))
+    """Return claims as a table, under each study's title the command that measures them."""
+    heads = [name for name in content.CLAIM_HEADS if name != "Paper" or judged[0][1].paper is not None]
+    bodies = []
+    for _, pairs in itertools.groupby(judged, key=lambda pair: pair[0].study):
+        group = list(pairs)
+        each = group[0][0]
         assert each.run is not None
-        printed = cell("Paper", paper) if claim.paper is not None else ""
-        rows.append(
-            f'<tr><td class="says">{says}</td>{printed}{cell("Measured", measured)}'
-            f'<td data-label="Verdict">{chip(claim.verdict.value, verdict)}</td>'
-            f'<td class="wide" data-label="Command">{_command(each.run.command)}</td></tr>'
+        link = f'<a href="{escape(each.study)}/{REPORT}">{escape(each.title)}</a>'
+        rows = "".join(_claim(claim) for _, claim in group)
+        bodies.append(
+            f'<tbody><tr class="group"><th colspan="{len(heads)}">{link}<br>{_command(each.run.command)}</th></tr>'
+            f"{rows}</tbody>"
         )
-    heads = [name for name in _HEADS if name != "Paper" or judged[0][1].paper is not None]
-    return f'<table class="stack">{head(heads)}<tbody>{"".join(rows)}</tbody></table>'
+    return f'<table class="stack">{head(heads)}{"".join(bodies)}</table>'
+
+
+def _claim(claim: Claim) -> str:
+    says, paper, measured, verdict = (escape(word) for word in content.claim_row(claim))
+    printed = cell("Paper", paper) if claim.paper is not None else ""
+    return (
+        f'<tr><td class="says">{says}</td>{printed}{cell("Measured", measured)}'
+        f'<td data-label="Verdict">{chip(claim.verdict.value, verdict)}</td></tr>'
+    )
 
 
 def _command(command: str) -> str:
@@ -95,9 +106,4 @@ def _studies(done: Sequence[Reproduction]) -> str:
             continue
         failed = f", {len(each.run.failures):,} failed" if each.run.failures else ""
         rows.append((each.study, f"{each.title}; {about}; {each.run.identity.cases:,} cases{failed}"))
-    links = "".join(
-        f'<li><a href="{escape(each.study)}/{REPORT}">{escape(each.study)}</a></li>'
-        for each in done
-        if each.run is not None
-    )
-    return f"{facts(rows)}<p>Full reports:</p><ul>{links}</ul>" if links else facts(rows)
+    return facts(rows)

@@ -105,6 +105,8 @@ def test_all_takes_the_others_too(package: Path, tmp_path: Path) -> None:
     assert "optsat reproduce --cases 3 --all" in page
     command = '<code>optsat study run ours <span class="option">--cases 3</span> <span class="option">--seed 0</span>'
     assert command in page, "a command that breaks between its options only"
+    groups = re.findall(r'<tr class="group"><th colspan="(\d)"><a href="(\w+)/report.html">', page)
+    assert groups == [("4", "same"), ("3", "ours"), ("3", "same")], "claims stand under their study"
 
 
 def test_a_study_that_fails_is_a_row(package: Path, tmp_path: Path) -> None:

@@ -96,14 +96,16 @@ def robust_minimax(
     if not 0 < tolerance < np.inf:
         raise InputError(f"`tolerance` must be > 0, got {tolerance!r}.")
     given: Any = {"lb": lb, "ub": ub, "A": A, "b": b, "Aeq": Aeq, "beq": beq}
-    warm: Start = start
-    rounds, more = 0, True
-    while more and rounds < _MOST_ROUNDS:
+
+    def settled_over_cases(at: ArrayLike | None) -> tuple[Solution[Attainment], list[BoxMaximum]]:
+        finite = best_attainment(robust.finite(given, at), None, starts, seed, engine)
+        return finite, robust.worst(finite.answer.x, tolerance * max(1.0, abs(finite.answer.factor)))
+
+    finite, worst = settled_over_cases(point_of(start))
+    rounds = 1
+    while robust.add(worst, finite, tolerance) and rounds < _MOST_ROUNDS:
+        finite, worst = settled_over_cases(finite.answer.x)
         rounds += 1
-        finite = best_attainment(robust.finite(given, point_of(warm)), None, starts, seed, engine)
-        worst = robust.worst(finite.answer.x, tolerance * max(1.0, abs(finite.answer.factor)))
-        more = robust.add(worst, finite, tolerance)
-        warm = finite.answer.x
     solution = robust.told(finite, worst, tolerance, rounds)
     if solution.proof in (Proof.NOTHING, Proof.INFEASIBLE):
         warnings.warn(robust.complaint(solution, tolerance), stacklevel=3)

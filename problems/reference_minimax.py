@@ -321,8 +321,8 @@ MINIMAX = (
         "Asaadi (1973)",
         convex=True,
         doubt=(
-            "The functions as printed have the proven optimum 93.905248 (92.764755 with x9 for x2 in the row before the "
-            "last, as some sources print it); linear rows as constraints change neither."
+            "The functions as printed have the proven optimum 93.905248 (92.764755 with x9 for x2 in the last row but "
+            "one, as some sources print it); linear rows as constraints change neither."
         ),
     ),
     ReferenceProblem("Shor", _shor, (0, 0, 0, 0, 1), 22.600162, 22.600162095771, "Shor (1985)", convex=True),

@@ -36,8 +36,10 @@ from optsat.problems.interval_wahba_functions import interval_functions
 from optsat.problems.minimax import Minimax
 from optsat.solution import Proof, Solution
 
-# of the factor against its lower bound
-_GLOBAL = 1e-9
+# of the factor against its lower bound, in the unit of the objectives; and what rounding of a loss near 0 may be
+_GLOBAL, _ROUNDING = 1e-8, 1e-15
+# least and largest unit of the objectives
+_UNITS = (1e-4, 1.0)
 # gap of the two largest eigenvalues of K_m below which a whole set of attitudes is optimal
 _SIMPLE = 1e-9
 
@@ -76,6 +78,7 @@ class IntervalWahba:
     goal_weights : lambda (2,) >= 0
     shared : one alpha and one beta for all pairs, as the paper's matrix form writes it
     search_fraction : each component of q within q_k +- fraction |q_k| of the TRIAD attitude of the middles; None = free
+    minimax : the problem in (q, alpha, beta) as solvers see it, objectives in units of the least L_m (1e-4 to 1)
 
     Raises
     ------
@@ -92,11 +95,16 @@ class IntervalWahba:
     shared: bool = False
     search_fraction: float | None = None
     pairs: IntervalPairs = field(init=False, repr=False)
+    unit: float = field(init=False, repr=False)
     minimax: Minimax = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        scale = self._checked_goal_weights()
         object.__setattr__(self, "pairs", IntervalPairs(self.b_B, self.r_N, self.weights))
-        object.__setattr__(self, "minimax", self._minimax(self._checked_goal_weights()))
+        least = abs(1.0 - float(np.linalg.eigvalsh(self.pairs.mid_matrix())[-1]))
+        # a solver's tolerance is absolute, and the loss of data that agree to arcminutes is tiny
+        object.__setattr__(self, "unit", float(np.clip(least, *_UNITS)))
+        object.__setattr__(self, "minimax", self._minimax(scale / self.unit))
 
     def _checked_goal_weights(self) -> Array:
         scale = finite_array("goal_weights", self.goal_weights, (2,))
@@ -129,7 +137,9 @@ class IntervalWahba:
         if norm:
             parts = pairs.losses(seed, np.zeros((len(pairs), 3)), np.zeros((len(pairs), 3)))
             start = np.append(start, scale * np.abs((parts.mid, parts.change)))
-        ties = 1 + 2 * len(pairs)
+        # a direction of no uncertainty has its length already; a row that nothing can move would only hinder solvers
+        size = np.max(np.stack((pairs.b_radius, pairs.r_radius), axis=1), axis=2).ravel()
+        slack = np.where(np.append(1.0, size) == 0.0, np.inf, 0.0)
         return Minimax(
             start,
             objectives,
@@ -137,11 +147,12 @@ class IntervalWahba:
             lb=lower,
             ub=upper,
             constraints=constraints,
-            constraints_lb=np.concatenate((np.zeros(ties), np.full(4 * norm, -np.inf))),
-            constraints_ub=np.zeros(ties + 4 * norm),
+            constraints_lb=np.concatenate((-slack, np.full(4 * norm, -np.inf))),
+            constraints_ub=np.concatenate((slack, np.zeros(4 * norm))),
             parameter_values=np.concatenate(
                 (
                     *(each.ravel() for each in (pairs.b_mid, pairs.b_radius, pairs.r_mid, pairs.r_radius)),
+                    np.where(size > 0, size, 1.0),
                     pairs.share,
                     scale,
                     [self.goal_norm if norm else 1.0],
@@ -168,7 +179,7 @@ class IntervalWahba:
         values = np.linalg.eigvalsh(self.pairs.mid_matrix())
         proof = general.proof
         feasible = proof in (Proof.FEASIBLE, Proof.STATIONARY, Proof.GLOBAL)
-        if feasible and factor - bound <= _GLOBAL * max(1.0, abs(bound)):
+        if feasible and factor - bound <= _GLOBAL * self.unit + _ROUNDING:
             proof = Proof.GLOBAL
         answer = IntervalAttitude(
             q_BN=q_BN,
@@ -203,7 +214,7 @@ class IntervalWahba:
 
 
 def interval_wahba_forms(b_B: ComponentBox, r_N: ComponentBox) -> dict[str, Minimax]:
-    """Return the paper's problem in its three forms, as ordinary min-max problems by name.
+    """Return the paper's problem in its three forms, as ordinary min-max problems by name; factors as in `minimax`.
 
     "absolute" : max(|L_m|, |DL|); "signed" : max(L_m, DL); "two_norm" : the sum of the squares
     """

@@ -1,7 +1,7 @@
 """CasADi functions of the interval-Wahba problem, built once for each number of pairs.
 
 x = (q_BN; alpha; beta), then one unknown per objective where a p-norm is minimised; parameters = (b^m; b^r; r^m; r^r;
-weights; lambda; p). Functions that are built once keep their derivatives and their solvers from call to call.
+size; weights; lambda; p). Functions that are built once keep their derivatives and their solvers from call to call.
 """
 
 from functools import lru_cache
@@ -14,7 +14,8 @@ def interval_functions(pairs: int, shared: bool, norm: bool) -> tuple[Any, Any]:
 
     shared : one alpha and one beta for all pairs
     norm : objective sum_i s_i^p with |lambda_i f_i| <= s_i among the constraints; else objectives lambda_i f_i
-    Constraints: |q|^2 - 1, |b_i|^2 - 1, |r_i|^2 - 1, all of which must vanish, then with `norm` four rows <= 0.
+    Constraints: |q|^2 - 1, and in turn (|b_i|^2 - 1) / size, (|r_i|^2 - 1) / size, all of which must vanish, then with
+    `norm` four rows <= 0. size : of the boxes, so that narrow ones are no flatter than wide ones
     """
     import casadi as ca
 
@@ -22,6 +23,7 @@ def interval_functions(pairs: int, shared: bool, norm: bool) -> tuple[Any, Any]:
     q, alpha, beta = ca.SX.sym("q", 4), ca.SX.sym("alpha", 3 * rows), ca.SX.sym("beta", 3 * rows)
     s = ca.SX.sym("s", 2 if norm else 0)
     data = [ca.SX.sym(name, 3 * pairs) for name in ("b_mid", "b_radius", "r_mid", "r_radius")]
+    size = ca.SX.sym("size", 2 * pairs)
     weights, scale, power = ca.SX.sym("weights", pairs), ca.SX.sym("scale", 2), ca.SX.sym("power")
     mid, change, unit = ca.SX(1), ca.SX(0), [ca.dot(q, q) - 1]
     for i in range(pairs):
@@ -30,8 +32,8 @@ def interval_functions(pairs: int, shared: bool, norm: bool) -> tuple[Any, Any]:
         db, dr = alpha[k : k + 3] * b_radius, beta[k : k + 3] * r_radius
         mid -= weights[i] * _projection(q, b, r)
         change -= weights[i] * (_projection(q, db, r) + _projection(q, b, dr) + _projection(q, db, dr))
-        unit += [ca.dot(b + db, b + db) - 1, ca.dot(r + dr, r + dr) - 1]
-    x, p = ca.vertcat(q, alpha, beta, s), ca.vertcat(*data, weights, scale, power)
+        unit += [(ca.dot(v, v) - 1) / size[2 * i + k] for k, v in enumerate((b + db, r + dr))]
+    x, p = ca.vertcat(q, alpha, beta, s), ca.vertcat(*data, size, weights, scale, power)
     objectives = ca.vertcat(scale[0] * mid, scale[1] * change)
     if norm:
         unit += [objectives - s, -objectives - s]

@@ -88,6 +88,8 @@ class WorstCaseWahba:
             raise InputError(
                 f"`b_B` must be a ComponentBox, got {type(self.b_B).__name__}; use ComponentBox.from_half_width."
             )
+        if len(self.b_B) == 0:
+            raise InputError("`b_B` holds no boxes; at least one is needed.")
         r_N = self.r_N
         if not isinstance(r_N, ComponentBox):
             r_N = ComponentBox.from_half_width(unit_rows("r_N", r_N, self.norm_policy), 0.0)

@@ -196,9 +196,10 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     axes.barh(0, 0, color="#D55E00", label="LEAK: sees the true attitude")
     axes.set_yticks(range(len(names)), [ROWS[name] for name in names], fontsize=8)
     axes.invert_yaxis()
+    axes.set_xlim(0, 1.15 * axes.get_xlim()[1])
     axes.set_xlabel("attitude error [deg]: mean, and one standard deviation to either side")
     axes.set_title("Who sees the answer, and what it is worth")
-    axes.legend(frameon=False, loc="lower right")
+    canvas.legend(frameon=False, loc="outside lower center", ncols=3)
     write_svg(canvas, path)
 
 

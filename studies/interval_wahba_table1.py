@@ -195,7 +195,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     axes.set_xlim(0, 75)
     axes.set_xlabel("attitude error [deg]")
     axes.set_title("Table 1: components wrong by up to 20 %, each dot a draw")
-    axes.legend(frameon=False, loc="lower right")
+    canvas.legend(frameon=False, loc="outside lower center", ncols=2)
     write_svg(canvas, path)
 
 

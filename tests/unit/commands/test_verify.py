@@ -113,6 +113,11 @@ def test_certificates_of_a_worst_case_are_known_too(tmp_path: Path) -> None:
     accepted = invoke("verify", file)
     assert accepted.exit_code == 0
     assert "2 certificates accepted, 0 rejected" in accepted.output
+    for damaged, message in (("{", "not JSON"), (changed(worst, format="other"), "`format` must be")):
+        file.write_text(damaged, encoding="utf-8")
+        refused = invoke("verify", file)
+        assert refused.exit_code == 2
+        assert message in refused.stderr
     file.write_text(changed(worst, gap=0.0), encoding="utf-8")
     rejected = invoke("verify", file)
     assert rejected.exit_code == 1

@@ -253,6 +253,7 @@ def test_damaged_files_name_the_field(change: dict[str, object], message: str) -
     [
         ({"b_B": B_B}, "`b_B` must be a ComponentBox, got ndarray"),
         ({"r_N": R_N[:1]}, "same number of boxes"),
+        ({"b_B": ComponentBox(np.zeros((0, 3)), np.zeros((0, 3))), "r_N": np.zeros((0, 3))}, "`b_B` holds no boxes"),
         ({"r_N": R_N * np.nan}, "`r_N` must be finite"),
         ({"r_N": R_N.T}, "`r_N` must have shape"),
         ({"r_N": np.zeros((2, 3))}, "`r_N` row 0 is the zero vector"),

@@ -153,3 +153,14 @@ def test_the_papers_box_that_misses_the_sphere_is_refused_by_its_row() -> None:
 def test_the_problem_cannot_be_told_the_truth() -> None:
     names = set(inspect.signature(IntervalWahba).parameters)
     assert not any(word in name for name in names for word in ("true", "truth", "exact", "start"))
+
+
+def test_data_that_agree_to_arcminutes_and_known_references_are_solved_to_a_proof_too() -> None:
+    rng = np.random.default_rng(19)
+    r = unit(rng.standard_normal((2, 3)))
+    b = unit(r + 1e-3 * rng.standard_normal((2, 3)))
+    boxes_of_arcminutes = ComponentBox.from_half_width(b, 1e-3), ComponentBox.from_half_width(r, 0.0)
+    solution = optsat.solve(IntervalWahba(*boxes_of_arcminutes))
+    q = optsat.wahba(b, r).answer
+    assert np.degrees(quaternion.error_angle(solution.require(Proof.GLOBAL).answer.q_BN, q.q_BN)) < 1e-4
+    np.testing.assert_array_equal(solution.answer.r_N, r)

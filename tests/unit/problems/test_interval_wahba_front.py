@@ -92,3 +92,17 @@ def test_what_cannot_be_searched_is_refused() -> None:
         IntervalWahbaFront(*boxes(*perturbed(np.random.default_rng(0))), search_fraction=0.0)
     with pytest.raises(UnsupportedFormError):
         Nsga2().run(Wahba(np.eye(3), np.eye(3)).lower())
+
+
+def test_of_the_members_the_one_of_least_larger_objective_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    form = problem(5).lower()
+    members = np.random.default_rng(5).uniform(form.lower, form.upper, (6, 16))
+    monkeypatch.setattr(nsga2, "pymoo_is_installed", lambda: True)
+    monkeypatch.setattr(Nsga2, "_minimise", lambda self, form: members)
+    point = Nsga2(generations=3).run(form)
+    larger = np.max(form.evaluate(members)[0], axis=1)
+    np.testing.assert_array_equal(point.x, members[np.argmin(larger)])
+    assert (point.termination, point.iterations) == (Termination.MAX_ITERATIONS, 3)
+    monkeypatch.setattr(Nsga2, "_minimise", lambda self, form: None)
+    empty = optsat.solve(problem(5), Nsga2())
+    assert (empty.termination, empty.proof) == (Termination.STALLED, Proof.NOTHING)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ def ordered(function: str, inputs: Sequence[Port], args: Sequence[Any], kwargs: 
     return [given[name] for name in names]
 
 
+@cache
 def data_type(real: Real) -> "np.dtype[Any]":
     """Return NumPy's type of the kernel's numbers."""
     return np.dtype(np.float32 if real == "float" else np.float64)

@@ -1,9 +1,7 @@
-"""True run: the motion of many runs of a diagnosis scenario at once, step by step in compiled code."""
+"""True run: the motion of many runs of a diagnosis scenario at once, a few steps in one call."""
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +16,9 @@ from optsat.symbolic.integrate import rk4_step
 from optsat.symbolic.repeat import repeated
 
 _AT_ONCE = 5
-"""Steps of one call of a kernel."""
+"""Steps of one call."""
+_WORTH_COMPILING = 8
+"""Runs at once from which on a compiled kernel is made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +66,8 @@ def _attitude(scenario: DiagnosisScenario, steps: Array, torque_B: Array, kicks:
     inertia = np.asarray(scenario.spacecraft.inertia_B)
     start = [np.array(scenario.q_BN), np.array(scenario.omega_BN_B)]
 
-    def arguments(at: slice) -> list[Array]:
-        return [torque[:, at], inertia, steps[:, at], kicks[:, at]]
-
-    q_BN, omega_BN_B = _march(_attitude_steps(scenario.attitude), start, arguments, *steps.shape)
+    by_step = {"torque_B": torque, "dt": steps, "omega_BN_B_kick": kicks}
+    q_BN, omega_BN_B = _march(_attitude_steps(scenario.attitude), start, by_step, inertia_B=inertia)
     return q_BN, omega_BN_B
 
 
@@ -80,11 +78,8 @@ def _orbit(scenario: DiagnosisScenario, steps: Array, force_N: Array) -> tuple[A
     force_N = np.broadcast_to(force_N, (len(steps), *force_N.shape[1:]))
     start = [np.array(scenario.r_N), np.array(scenario.v_N)]
 
-    def arguments(at: slice) -> list[Array]:
-        return [force_N[:, at], steps[:, at]]
-
     mu, oblate = scenario.spacecraft.gravitational_parameter, scenario.orbit is OrbitTruth.OBLATE
-    r_N, v_N = _march(_orbit_steps(mu, oblate), start, arguments, *steps.shape)
+    r_N, v_N = _march(_orbit_steps(mu, oblate), start, {"specific_force_N": force_N, "dt": steps})
     return r_N, v_N
 
 
@@ -94,29 +89,29 @@ def _nine_state(
     r_N = np.array(scenario.r_N)
     start = [r_N, np.array(scenario.v_N), field(r_N)]
 
-    def arguments(at: slice) -> list[Array]:
-        return [steps[:, at], kicks[:, at]]
-
     mu = scenario.spacecraft.gravitational_parameter
-    r_N, v_N, a_N = _march(_nine_state_steps(mu), start, arguments, *steps.shape)
+    r_N, v_N, a_N = _march(_nine_state_steps(mu), start, {"dt": steps, "a_N_kick": kicks})
     return r_N, v_N, a_N
 
 
-def _march(
-    kernel: Any, start: list[Array], arguments: Callable[[slice], list[Array]], runs: int, count: int
-) -> list[Array]:
+def _march(function: GeneratedFunction, start: list[Array], by_step: dict[str, Array], **shared: Array) -> list[Array]:
     """Return the states (runs, count + 1, n) from `start`, equal for all runs.
 
-    kernel : of _AT_ONCE steps; arguments(rows) : what it takes besides the states, for those steps
+    function : of _AT_ONCE steps; by_step : its arguments (runs, count, ...) that differ from step to step
     """
+    runs, count = by_step["dt"].shape
+    names = [port.name for port in function.outputs]
+    # a few runs are over before a compiler would have started; a function that is used often compiles itself
+    batch = function.kernel().batch if runs >= _WORTH_COMPILING else function.batch
     kept = [np.empty((runs, count + 1, len(state))) for state in start]
     states = [np.tile(state, (runs, 1)) for state in start]
     for each, state in zip(kept, states, strict=True):
         each[:, 0] = state
     for first in range(0, count, _AT_ONCE):
         rows = slice(first, min(first + _AT_ONCE, count))
-        further = [_filled(each) if each.ndim > 1 and len(each) == runs else each for each in arguments(rows)]
-        for each, state in zip(kept, kernel.batch(*states, *further), strict=True):
+        arguments = {name: _filled(values[:, rows]) for name, values in by_step.items()}
+        results = batch(**dict(zip(names, states, strict=True)), **arguments, **shared)
+        for each, state in zip(kept, results, strict=True):
             each[:, rows.start + 1 : rows.stop + 1] = state[:, : rows.stop - rows.start]
         states = [np.ascontiguousarray(each[:, rows.stop]) for each in kept]
     return kept
@@ -148,18 +143,18 @@ def _gravity(gravitational_parameter: float, oblate: bool) -> GeneratedFunction:
 
 
 @functools.cache
-def _attitude_steps(truth: AttitudeTruth) -> Any:
+def _attitude_steps(truth: AttitudeTruth) -> GeneratedFunction:
     step = attitude_step() if truth is AttitudeTruth.RUNGE_KUTTA else attitude_euler_step()
-    return repeated(step, ("q_BN", "omega_BN_B"), ("torque_B", "dt"), _AT_ONCE, "omega_BN_B").kernel()
+    return repeated(step, ("q_BN", "omega_BN_B"), ("torque_B", "dt"), _AT_ONCE, "omega_BN_B")
 
 
 @functools.lru_cache(maxsize=8)
-def _orbit_steps(gravitational_parameter: float, oblate: bool) -> Any:
+def _orbit_steps(gravitational_parameter: float, oblate: bool) -> GeneratedFunction:
     step = rk4_step(translation_derivative(_gravity(gravitational_parameter, oblate)), ("r_N", "v_N"))
-    return repeated(step, ("r_N", "v_N"), ("specific_force_N", "dt"), _AT_ONCE).kernel()
+    return repeated(step, ("r_N", "v_N"), ("specific_force_N", "dt"), _AT_ONCE)
 
 
 @functools.lru_cache(maxsize=8)
-def _nine_state_steps(gravitational_parameter: float) -> Any:
+def _nine_state_steps(gravitational_parameter: float) -> GeneratedFunction:
     step = nine_state_euler_step(gravitational_parameter)
-    return repeated(step, ("r_N", "v_N", "a_N"), ("dt",), _AT_ONCE, "a_N").kernel()
+    return repeated(step, ("r_N", "v_N", "a_N"), ("dt",), _AT_ONCE, "a_N")

@@ -90,7 +90,7 @@ def parameter_rows(run: FinishedRun) -> Rows:
 
 def provenance_rows(run: FinishedRun) -> Rows:
     """Return where it was computed, and the digests of its files."""
-    said = [(name, _provenance_words(value)) for name, value in run.provenance.items()]
+    said = [(name, _provenance_words(value)) for name, value in run.provenance.items() if value is not None]
     files = [(name, f"{digest['bytes']} bytes, SHA-256 {digest['sha256']}") for name, digest in run.digests.items()]
     return [*said, ("numerics", ", ".join(run.numerics)), *files]
 

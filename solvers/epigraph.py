@@ -65,7 +65,7 @@ def run_epigraph(
         iterations=int(stats.get("iter_count", 0)),
         stats={
             "status": status,
-            "evaluations": int(stats.get("n_call_nlp_g", 0)),
+            "evaluations": int(stats.get("n_call_nlp_g", stats.get("n_call_nlp_fg", 0))),
             "jacobian_evaluations": int(stats.get("n_call_nlp_jac_g", stats.get("n_call_nlp_jac_fg", 0))),
         },
     )

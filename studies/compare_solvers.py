@@ -8,11 +8,13 @@ second run, when derivatives and solvers are there, over that of the fastest eng
 machine changes them. The figure is the performance profile: for each engine the share of runs that it solved in at
 most tau times the best time.
 
-Take `auto`, with several starts where the problem is not convex: it solved what any engine solves. Convex quadratics
-and norms: `conic_minmax` needs no start and is the most exact, `auto` takes it by itself. The same smooth problem again
-and again with other numbers: `compiled_minmax` after a second or two of compilation, or `("sqp_daqp", "auto")` without
-a compiler. `ipopt` is the most dependable of the single engines, `sqp_osqp` and `sqp_ipqp` are there for the cases in
-which it stops short; `slsqp` is for functions that are known only by their values.
+Which engine for what. `auto` unless you have a reason: 94 % of the problems from their usual starts, all of them with
+eight starts, so give `starts` whenever a problem is not convex. Convex quadratics and norms: `conic_minmax`, without a
+start, which `auto` takes by itself. The same smooth problem again and again with other numbers: `compiled_minmax`, the
+fastest engine of all after a second or two of compilation, or `("sqp_daqp", "auto")` without a compiler, seven times as
+fast as `auto` where it solves. Single engines from arbitrary starts: `slsqp` (with exact derivatives here) and `ipopt`
+are the most dependable, and fail on different problems, so `auto` runs both. `sqp_osqp` and `sqp_ipqp` seldom solve
+what the others do not. Functions known only by their values: `slsqp` is the only one.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -134,9 +136,15 @@ def metrics(rows: Sequence[Row]) -> Mapping[str, float]:
             f"solved_convex_{name}": _mean([row[f"solved_{name}"] for row in taken if row["convex"]]),
             f"honest_{name}": _mean([row[f"honest_{name}"] for row in taken]),
             f"iterations_{name}": _median([row[f"iterations_{name}"] for row in solved]),
-            f"evaluations_{name}": _median([row[f"evaluations_{name}"] for row in solved]),
             f"time_ratio_{name}": _median([row[f"time_ratio_{name}"] for row in solved]),
         }
+        # some engines do not count them
+        if any(row[f"evaluations_{name}"] for row in solved):
+            figures[f"evaluations_{name}"] = _median([row[f"evaluations_{name}"] for row in solved])
+    conic = [row for row in rows if row["solved_conic_minmax"]]
+    figures["ipopt_over_conic_minmax"] = _median(
+        [row["time_ratio_ipopt"] / row["time_ratio_conic_minmax"] for row in conic if row["solved_ipopt"]]
+    )
     figures["unsolved_problems_auto_8"] = float(len(_unsolved(rows, "auto_8")))
     for key in ("hard_violation", "weight_sum_error"):
         figures[key] = float(max(row[f"{key}_{name}"] for row in rows for name in ENGINES))
@@ -192,6 +200,52 @@ def claims(figures: Mapping[str, float]) -> list[Claim]:
             "largest violation of a hard goal by a stationary answer, at most 1e-8",
             measured=hard,
             holds=hard <= 1e-8,
+        ),
+        *_advice(figures),
+    ]
+
+
+def _advice(figures: Mapping[str, float]) -> list[Claim]:
+    """Return which engine to take for what, as claims that fail where the advice does not hold."""
+    together, alone = (
+        figures["solved_usual_start_auto_8"],
+        max(figures[f"solved_usual_start_{name}"] for name in SINGLE),
+    )
+    conic = figures["ipopt_over_conic_minmax"]
+    smooth = [name for name in SINGLE if name not in ("conic_minmax", "compiled_minmax")]
+    quick = min(smooth, key=lambda name: figures[f"time_ratio_{name}"] or np.inf)
+    dependable = max(smooth, key=lambda name: figures[f"solved_{name}"])
+    compiled = figures["time_ratio_compiled_minmax"]
+    return [
+        judge_bar(
+            "take-auto",
+            "for a problem that may have several optima take `auto` with several starts: no single engine solves more",
+            measured=together,
+            holds=together >= alone,
+        ),
+        judge_bar(
+            "take-conic",
+            "for convex quadratics and norms take `conic_minmax`, as `auto` does: time of `ipopt` over its own, > 1",
+            measured=conic,
+            holds=conic > 1.0,
+        ),
+        judge_bar(
+            "take-compiled",
+            "for the same problem again with other numbers take `compiled_minmax`: median time over the fastest, 1",
+            measured=compiled,
+            holds=compiled == 1.0,
+        ),
+        judge_bar(
+            "take-without-compiler",
+            'without a compiler take `("sqp_daqp", "auto")` for that: the quickest of the other engines',
+            measured=quick,
+            holds=quick == "sqp_daqp",
+        ),
+        judge_bar(
+            "take-single",
+            "for one engine alone from any start take `slsqp` or `ipopt`: that which solves most",
+            measured=dependable,
+            holds=dependable in ("slsqp", "ipopt"),
         ),
     ]
 

@@ -1,9 +1,11 @@
 """Attitude bank model: motion, sensors and change of reference of an attitude bank, symbolically."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
+from optsat.arrays import Array
 from optsat.attitude import quaternion, rotation_vector
 from optsat.attitude.backend import Value
 from optsat.estimators.attitude_bank import AttitudeBank
@@ -63,6 +65,7 @@ def attitude_bank_model(bank: AttitudeBank) -> BankModel:
         states=symbols.names,
         spread=(*[bank.attitude_prior] * 3, *[bank.rate_prior] * 3, *[bank.bias_prior] * (3 * symbols.has_bias)),
         sample_time=bank.sample_time,
+        example=partial(_example, bank, symbols),
     )
 
 
@@ -243,3 +246,27 @@ def _shift(s: _Symbols) -> GeneratedFunction:
         [*ports, (Port("state", (s.size,), "SI"), error)],
         [(Port("reference", (joined.numel(),), "SI"), joined)],
     )
+
+
+def _example(bank: AttitudeBank, s: _Symbols, rng: np.random.Generator) -> dict[str, Array]:
+    def turned(q_BN: Array, deviation: float) -> Array:
+        return np.asarray(quaternion.compose(quaternion.exponential(deviation * rng.normal(size=3)), q_BN))
+
+    q = quaternion.canonical(quaternion.exponential(rng.normal(size=3)))
+    omega = 0.05 * rng.normal(size=3)
+    found = {port.name: 0.01 * rng.normal(size=port.shape) for port in (*s.reference_ports, *s.carried_ports)}
+    found |= {port.name: 0.01 * rng.normal(size=port.shape) for port in s.input_ports}
+    channels = len(bank.channels)
+    return found | {
+        "q_BN": q,
+        "omega_BN_B": omega,
+        "star_BN": turned(q, 3e-4),
+        "last_star_BN": turned(q, 0.05),
+        "gyro_B": omega + 0.01 * rng.normal(size=3),
+        "dt": np.array(bank.sample_time),
+        "command_B": rng.uniform(0.0, 5.0, 3),
+        "last_command_B": rng.uniform(0.0, 5.0, 3),
+        # off the ends, which rounding to float could pass
+        "received": rng.choice([0.1, 0.9], channels, p=[0.2, 0.8]),
+        "seen": rng.choice([0.1, 0.9], channels),
+    }

@@ -53,15 +53,9 @@ class AttitudeBankFilter:
         structure, runs = self.model.structure, len(q)
         failed = np.arange(structure.modes) >> np.arange(structure.bits)[:, None] & 1 == 1
         prior = np.where(failed, self.bank.fault_prior, 1.0 - self.bank.fault_prior).prod(axis=0)
-        covariance = np.zeros((structure.packed, structure.modes))
-        for e, deviation in enumerate(self.model.spread):
-            covariance[e * (e + 1) // 2 + e] = deviation**2
-        for a, (bit, variance) in enumerate(structure.actuated):
-            e = structure.states - len(structure.actuated) + a
-            covariance[e * (e + 1) // 2 + e] = np.where(failed[bit], variance, 0.0)
         known = {
             "probability": prior,
-            "covariance": covariance,
+            "covariance": self.model.covariance_at_start(),
             "q_BN": q / length[:, None],
             "omega_BN_B": omega,
             "last_star_BN": np.array([0.0, 0.0, 0.0, 1.0]),

@@ -1,8 +1,11 @@
 """Bank model: what a hypothesis bank is made of, from its motion and sensors to the kernel of one step."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from optsat.arrays import Array
 from optsat.attitude.backend import Value
 from optsat.errors import InputError
 from optsat.estimators.bank_samples import BankSamples
@@ -24,6 +27,7 @@ class BankModel:
     states : names of the error states with their units
     spread : deviation of each state that no actuator drives, at the start and after a long gap
     sample_time : that noises and chances per step belong to [s]
+    example : reference, carried values and inputs that belong together, by port, from a generator
     """
 
     structure: BankStructure
@@ -38,6 +42,7 @@ class BankModel:
     states: tuple[str, ...]
     spread: tuple[float, ...]
     sample_time: float
+    example: Callable[[np.random.Generator], Mapping[str, Array]]
 
     def kernel_source(self, name: str, floor: float = 1e-60) -> KernelSource:
         """Return the kernel of one step.
@@ -56,7 +61,34 @@ class BankModel:
             self.carried,
             self.inputs,
             floor,
+            self._example,
         )
+
+    def covariance_at_start(self) -> Array:
+        """Return the packed covariances (states (states + 1) / 2, modes) by the spread and the faults' priors."""
+        structure = self.structure
+        failed = np.arange(structure.modes) >> np.arange(structure.bits)[:, None] & 1 == 1
+        covariance = np.zeros((structure.packed, structure.modes))
+        for e, deviation in enumerate(self.spread):
+            covariance[e * (e + 1) // 2 + e] = deviation**2
+        for a, (bit, variance) in enumerate(structure.actuated):
+            e = len(self.spread) + a
+            covariance[e * (e + 1) // 2 + e] = np.where(failed[bit], variance, 0.0)
+        return covariance
+
+    def _example(self, rng: np.random.Generator) -> Array:
+        modes, n = self.structure.modes, self.structure.states
+        spread = np.array([*self.spread, *(variance**0.5 for _, variance in self.structure.actuated)])
+        covariance = self.covariance_at_start() * rng.uniform(0.5, 1.0, modes)
+        known = {
+            "probability": rng.dirichlet(np.ones(modes)),
+            "mean": 0.05 * spread[:, None] * rng.normal(size=(n, modes)),
+            "covariance": covariance,
+            **self.example(rng),
+        }
+        order = ["probability", "mean", "covariance"]
+        order += [port.name for port in (*self.reference, *self.carried, *self.inputs)]
+        return np.concatenate([np.ravel(known[name]) for name in order])
 
 
 def checked_faults(faults: Sequence[Part | Sequence[Part]], known: Sequence[Part]) -> tuple[Fault, ...]:

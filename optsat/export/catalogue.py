@@ -135,6 +135,18 @@ CATALOGUE: Mapping[str, Entry] = {
         "optsat.estimators.unscented_loops:unscented_filter_7_loops",
         "the same unscented Kalman filter step in loops, for little flash",
     ),
+    **{
+        f"attitude_bank_{modes}": Entry(
+            "optsat.estimators.bank_kernels:attitude_bank",
+            f"step of {modes} joint hypotheses of faults of {what}, with attitude, rate and torques",
+            {"modes": modes},
+        )
+        for modes, what in {
+            16: "gyro and star tracker",
+            32: "gyro, star tracker and thrusters together",
+            128: "gyro, star tracker and thrusters axis by axis",
+        }.items()
+    },
 }
 """Entry by public name."""
 

@@ -11,7 +11,7 @@ from optsat.export.tools import ToolError, find_tool, run_tool
 EXACT = ("sqrt", "fabs", "floor", "ceil", "copysign")
 """Functions of C that give the same bits everywhere; most compilers need no library for them."""
 
-COMPILER_SUPPORT = ("__aeabi_", "memcpy", "memset")
+COMPILER_SUPPORT = ("__aeabi_", "memcpy", "memmove", "memset")
 """Beginnings of names that compilers call where the processor lacks an instruction, and to move structures."""
 
 _NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "([^"]*)"', re.MULTILINE)

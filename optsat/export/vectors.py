@@ -14,6 +14,8 @@ from optsat.export.outcome import Outcome, outcome
 from optsat.port import Port
 
 GOOD = 32
+_FEWEST = 6
+_MOST_NUMBERS = 100_000
 _NOISE = 0.01
 
 _FLOAT_ROUNDING = 2.0**-23
@@ -39,6 +41,7 @@ class Vector:
 def draw_vectors(definition: Definition, interface: Interface, limits: bool, good: int = GOOD) -> list[Vector]:
     """Return `good` vectors within the checks of the ports, and then one for each way to break a check.
 
+    Of a kernel with many arguments they are fewer, down to six.
     limits : also those with an entry at a limit, where float may answer otherwise than double
 
     Left out are arguments on which the answer hangs by a thread, such as an attitude from one direction: rounding them
@@ -47,6 +50,7 @@ def draw_vectors(definition: Definition, interface: Interface, limits: bool, goo
     """
     seed = int.from_bytes(hashlib.sha256(definition.source.name.encode()).digest()[:8], "big")
     rng = np.random.default_rng(seed)
+    good = min(good, max(_FEWEST, _MOST_NUMBERS // max(interface.length_in, 1)))
     drawn = [draw(interface, rng) for _ in range(_TRIES * good)]
     vectors = [Vector(x, count, outcome(definition, interface, x, count)) for x, count in drawn[:good]]
     scale = np.max([np.abs(vector.expected.y) for vector in vectors], axis=0)
@@ -78,6 +82,8 @@ def draw_vectors(definition: Definition, interface: Interface, limits: bool, goo
 def draw(interface: Interface, rng: np.random.Generator) -> tuple[Array, int]:
     """Return arguments (k_in,) within the checks of all ports, and a count of rows."""
     inputs = interface.source.inputs
+    if interface.source.example is not None:
+        return interface.source.example(rng).astype(np.float32).astype(np.float64), 0
     values = {port.name: _drawn(port, rng) for port in inputs}
     directions = [port for port in inputs if port.direction is not None]
     if len(directions) == 2 and directions[0].shape == directions[1].shape and directions[0].row_length == 3:

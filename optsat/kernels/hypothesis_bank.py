@@ -11,7 +11,7 @@ from optsat.kernels.evaluate import evaluator
 from optsat.kernels.instantiate import instantiate
 from optsat.kernels.sizes import check_size
 from optsat.kernels.slots import of_one
-from optsat.kernels.source import KernelSource
+from optsat.kernels.source import Example, KernelSource
 from optsat.kernels.twins.hypothesis_bank import HypothesisBankTwin
 from optsat.port import Port
 
@@ -82,6 +82,7 @@ def hypothesis_bank(
     carried: Sequence[Port],
     inputs: Sequence[Port],
     floor: float = 1e-60,
+    example: Example | None = None,
 ) -> KernelSource:
     """Return the kernel of one step of a bank of 2^bits Gaussians that share a reference.
 
@@ -100,6 +101,7 @@ def hypothesis_bank(
     shift : (reference, state) -> reference moved by an error state
     reference : ends with the deviations that the actuated states are about
     floor : of a mode's probability, at most 1e-30
+    example : arguments that belong together, for the self-test of flight code
 
     Status: OS_E_NOT_FINITE for such an argument, OS_E_STATE where the probabilities are none or a variance is negative,
     OS_E_OUTPUT where a result is not finite; all results are then NaN.
@@ -199,6 +201,7 @@ def hypothesis_bank(
             structure, sizes, constants, {slot: evaluator(program) for slot, program in programs.items()}
         ),
         operations=_operations(structure) + programs["predict"].operation_count + programs["observe"].operation_count,
+        example=example,
     )
 
 

@@ -10,7 +10,7 @@ from optsat.errors import InputError
 from optsat.kernels.elementary import libm_of
 from optsat.kernels.print_scalar import c_constant, print_scalar
 from optsat.kernels.program import Program, starts
-from optsat.kernels.source import KernelSource, Twin
+from optsat.kernels.source import Example, KernelSource, Twin
 from optsat.port import Port
 
 Leaf: TypeAlias = Program | KernelSource
@@ -46,6 +46,7 @@ def instantiate(
     constants: Mapping[str, float] | None = None,
     tables: Mapping[str, Sequence[int] | Sequence[float]] | None = None,
     operations: int | None = None,
+    example: Example | None = None,
 ) -> KernelSource:
     """Return the kernel `name` of `optsat/kernels/templates/TEMPLATE.c`.
 
@@ -92,6 +93,7 @@ def instantiate(
         libm=tuple(sorted({function for leaf in leaves.values() for function in _libm(leaf)})),
         operations=sum(map(operation_count, leaves.values())) if operations is None else operations,
         twin=twin,
+        example=example,
     )
 
 

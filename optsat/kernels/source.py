@@ -3,12 +3,18 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from optsat.arrays import Array
 from optsat.kernels.elementary import headers_of
 from optsat.port import Port
 
 Twin = Callable[[Array], tuple[int, Array]]
 """The same computation in plain Python: x (k_in,) to status and y (k_out,)."""
+
+
+Example = Callable[[np.random.Generator], Array]
+"""Arguments in a row from a generator."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +32,7 @@ class KernelSource:
     libm : the C functions used whose last bits depend on the machine
     operations : arithmetic operations of one sample, or of one iteration where they are not fixed
     twin : the same in plain Python, where no C compiler is; None for a leaf, which CasADi runs
+    example : arguments x (k_in,) that belong together, drawn anew, where numbers drawn port by port would not
     float_ulp : how far a result in single precision may be from that of double, in units in the last place of the
         largest number that it has; more than usual where an iteration ends at rounding
     """
@@ -40,6 +47,7 @@ class KernelSource:
     libm: tuple[str, ...] = ()
     operations: int = 0
     twin: Twin | None = None
+    example: Example | None = None
     float_ulp: float = 4096.0
 
     @property

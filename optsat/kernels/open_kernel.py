@@ -29,7 +29,7 @@ class KernelChangedError(OptsatError):
 def open_kernel(definition: str, real: Real = "double", math: Math = "own", **parameters: Any) -> Kernel:
     """Return the kernel that a function defines; one in the cache is ready in a millisecond without CasADi.
 
-    The first of a process takes two or three: it also loads the binding and looks at the files of optsat and the compiler.
+    The first of a process takes two or three: it loads the binding and looks at the compiler and the files of optsat.
 
     definition : "module:function", a function that returns a GeneratedFunction or a KernelSource
     real, math : as of `make_kernel`; parameters : of the function, plain numbers, texts, lists or arrays

@@ -2,6 +2,7 @@
 
 import functools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -79,7 +80,7 @@ def _orbit(scenario: DiagnosisScenario, steps: Array, force_N: Array) -> tuple[A
     start = [np.array(scenario.r_N), np.array(scenario.v_N)]
 
     mu, oblate = scenario.spacecraft.gravitational_parameter, scenario.orbit is OrbitTruth.OBLATE
-    r_N, v_N = _march(_orbit_steps(mu, oblate), start, {"specific_force_N": force_N, "dt": steps})
+    r_N, v_N = _march(_orbit_steps(mu, oblate), start, {"specific_force_N": force_N[:, :-1], "dt": steps})
     return r_N, v_N
 
 
@@ -100,29 +101,39 @@ def _march(function: GeneratedFunction, start: list[Array], by_step: dict[str, A
     function : of _AT_ONCE steps; by_step : its arguments (runs, count, ...) that differ from step to step
     """
     runs, count = by_step["dt"].shape
-    names = [port.name for port in function.outputs]
     # a few runs are over before a compiler would have started; a function that is used often compiles itself
-    batch = function.kernel().batch if runs >= _WORTH_COMPILING else function.batch
-    kept = [np.empty((runs, count + 1, len(state))) for state in start]
-    states = [np.tile(state, (runs, 1)) for state in start]
-    for each, state in zip(kept, states, strict=True):
-        each[:, 0] = state
-    for first in range(0, count, _AT_ONCE):
-        rows = slice(first, min(first + _AT_ONCE, count))
-        arguments = {name: _filled(values[:, rows]) for name, values in by_step.items()}
-        results = batch(**dict(zip(names, states, strict=True)), **arguments, **shared)
-        for each, state in zip(kept, results, strict=True):
-            each[:, rows.start + 1 : rows.stop + 1] = state[:, : rows.stop - rows.start]
-        states = [np.ascontiguousarray(each[:, rows.stop]) for each in kept]
-    return kept
+    batch: Any = function.kernel().batch if runs >= _WORTH_COMPILING else None
+    calls = -(-count // _AT_ONCE)
+    arguments = {name: _by_calls(values, calls) for name, values in by_step.items()}
+    kept = [np.empty((runs, 1 + calls * _AT_ONCE, len(state))) for state in start]
+    for values, state in zip(kept, start, strict=True):
+        values[:, 0] = state
+    states = [values[:, 0] for values in kept]
+    for call in range(calls):
+        rows = slice(1 + call * _AT_ONCE, 1 + (call + 1) * _AT_ONCE)
+        if batch is not None:
+            named = {port.name: np.ascontiguousarray(x) for port, x in zip(function.outputs, states, strict=True)}
+            results = batch(**named, **{name: values[call] for name, values in arguments.items()}, **shared)
+            for values, result in zip(kept, results, strict=True):
+                values[:, rows] = result
+        else:
+            for run in range(runs):
+                named = {port.name: x[run] for port, x in zip(function.outputs, states, strict=True)}
+                results = function(**named, **{name: values[call, run] for name, values in arguments.items()}, **shared)
+                for values, result in zip(kept, results, strict=True):
+                    values[run, rows] = result
+        states = [values[:, rows.stop - 1] for values in kept]
+    return [values[:, : count + 1] for values in kept]
 
 
-def _filled(rows: Array) -> Array:
-    """Return (runs, _AT_ONCE, ...) from fewer steps, the last repeated; what follows from those is thrown away."""
-    missing = _AT_ONCE - rows.shape[1]
-    if missing:
-        rows = np.concatenate((rows, np.repeat(rows[:, -1:], missing, axis=1)), axis=1)
-    return np.ascontiguousarray(rows)
+def _by_calls(values: Array, calls: int) -> Array:
+    """Return (calls, runs, _AT_ONCE, ...) from (runs, count, ...), the last step repeated; what follows from those
+    repetitions is thrown away.
+    """
+    missing = calls * _AT_ONCE - values.shape[1]
+    filled = np.concatenate((values, np.repeat(values[:, -1:], missing, axis=1)), axis=1) if missing else values
+    shaped = filled.reshape(len(values), calls, _AT_ONCE, *values.shape[2:])
+    return np.ascontiguousarray(np.swapaxes(shaped, 0, 1))
 
 
 def _force(scenario: DiagnosisScenario, t: Array, q_BN: Array) -> Array:

@@ -60,6 +60,8 @@ def _reference(entry: dict[str, Any]) -> str:
 
 
 def _allowed(node: dict[str, Any]) -> str:
+    if "const" in node:
+        return f'"{node["const"]}"'
     if "enum" in node:
         return "one of " + ", ".join(f'"{word}"' for word in node["enum"])
     if node.get("type") == "array" and (count := node.get("minItems")) == node.get("maxItems") is not None:

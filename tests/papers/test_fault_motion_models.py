@@ -69,7 +69,7 @@ def test_oblate_gravity_is_the_gradient_of_its_potential() -> None:
     def potential(r: Array) -> float:
         distance = float(np.linalg.norm(r))
         legendre = 1.5 * (r[2] / distance) ** 2 - 0.5
-        return MU / distance * (1 - EARTH_J2 * (EQUATORIAL_RADIUS / distance) ** 2 * legendre)
+        return float(MU / distance * (1 - EARTH_J2 * (EQUATORIAL_RADIUS / distance) ** 2 * legendre))
 
     steps = 10.0 * np.eye(3)
     gradient = [(potential(R0 + step) - potential(R0 - step)) / 20.0 for step in steps]

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from optsat.arrays import Array
 from optsat.errors import InputError
 from optsat.models.faults import Fault, SensorFaultKind, ThrusterFaultKind
 from optsat.models.parts import ACCELEROMETER, GYRO, PRESSURE, THRUSTERS, Part
@@ -12,7 +13,7 @@ from optsat.models.schedule import Schedule, constant
 from optsat.models.spacecraft import Spacecraft
 from optsat.models.thrusters import ThrusterPairs
 
-T = np.arange(6) * 0.1
+T: Array = np.arange(6, dtype=np.float64) * 0.1
 COMMAND = np.array([1.0, 2.0, 5.0])
 
 
@@ -88,7 +89,10 @@ def test_signed_pairs_take_negative_commands() -> None:
     ("arguments", "says"),
     [
         ((Part.GYRO_X, ThrusterFaultKind.OPEN, 0, 1), "fault of gyro.x is 'open'. Known: dead, stuck"),
-        ((Part.THRUSTER_X, SensorFaultKind.DEAD, 0, 1), "fault of thruster.x is 'dead'. Known: reduced, locked, open, closed"),
+        (
+            (Part.THRUSTER_X, SensorFaultKind.DEAD, 0, 1),
+            "fault of thruster.x is 'dead'. Known: reduced, locked, open, closed",
+        ),
         ((Part.THRUSTER_X, "opn", 0, 1), "is 'opn'. Did you mean `open`"),
         ((Part.GYRO_X, SensorFaultKind.DEAD, 1, 1), "`stop_s` must be > 1"),
         ((Part.GYRO_X, SensorFaultKind.DEAD, math.nan, 1), "`start_s` must be finite"),
@@ -108,7 +112,7 @@ def test_faults_are_checked(arguments: tuple[object, ...], says: str) -> None:
 
 
 def test_windows_take_the_start_and_not_the_end_whatever_the_rounding() -> None:
-    t = 0.1 * np.arange(700)
+    t = 0.1 * np.arange(700, dtype=np.float64)
     for k in range(1, 600, 7):
         active = Fault(Part.GPS, SensorFaultKind.DEAD, k / 10, (k + 50) / 10).active(t)
         assert np.flatnonzero(active).tolist() == list(range(k, k + 50))
@@ -120,7 +124,7 @@ def test_schedule() -> None:
     at = pulses.at(np.array([[0.0, 0.5, 0.99], [1.0, 2.0, 2.5]]))
     assert at.tolist() == [[[0, 0, 0], [1, 2, 3], [1, 2, 3]], [[0, 0, 4], [0, 0, 0], [1, 2, 3]]]
     # 29 * 0.1 s is a little less than 2.9 s
-    assert Schedule((2.9,), ((1, 0, 0),)).at(29 * np.array(0.1)).tolist() == [1, 0, 0]
+    assert Schedule((2.9,), ((1, 0, 0),)).at(np.array(29 * 0.1)).tolist() == [1, 0, 0]
     assert constant(1, 2, 3).at(np.array(1e9)).tolist() == [1, 2, 3]
     assert Schedule((), ()).at(T).tolist() == 6 * [[0, 0, 0]]
 

@@ -32,6 +32,8 @@ from optsat.solution import Proof, Solution
 # of the gap between worst-case loss and lower bound, relative to the loss
 GLOBAL = 1e-6
 _LARGEST_SCALE = 3.0
+# corners times pairs: the programme is dense
+_MOST_ENTRIES = 20_000_000
 _UPPER = tuple((i, j) for j in range(3) for i in range(j + 1))
 
 
@@ -94,6 +96,12 @@ class WorstCaseWahba:
         if not isinstance(r_N, ComponentBox):
             r_N = ComponentBox.from_half_width(unit_rows("r_N", r_N, self.norm_policy), 0.0)
         pairs = IntervalPairs(self.b_B, r_N, self.weights)
+        count = int(np.sum(2 ** np.count_nonzero(np.hstack((pairs.b_radius, pairs.r_radius)), axis=1)))
+        if count * len(pairs) > _MOST_ENTRIES:
+            raise InputError(
+                f"`b_B` and `r_N` have {count} corners in {len(pairs)} pairs, more than the programme can hold; take "
+                "fewer pairs, or boxes that are uncertain in fewer components."
+            )
         corners = BoxCorners(pairs.b_mid, pairs.b_radius, pairs.r_mid, pairs.r_radius, pairs.share)
         unit = normalise_rows("b_B", pairs.b_mid), normalise_rows("r_N", pairs.r_mid)
         pivot = dominant_quaternion(davenport_matrix(*unit, pairs.share))

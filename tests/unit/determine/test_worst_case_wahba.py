@@ -24,6 +24,7 @@ from optsat.solution import Proof, Termination
 B_B = np.array([[1.0, 0, 0], [0.28, 0.96, 0]])
 R_N = np.array([[0, 0.6, 0.8], [0.936, 0, 0.352]])
 RADIUS = np.array([[0.05, 0.1, 0.02], [0.08, 0.03, 0.1]])
+MANY = ComponentBox.from_half_width(np.tile([[1.0, 0, 0]], (600, 1)), 0.1)
 
 
 def unit(v: Array) -> Array:
@@ -258,6 +259,7 @@ def test_damaged_files_name_the_field(change: dict[str, object], message: str) -
         ({"r_N": R_N.T}, "`r_N` must have shape"),
         ({"r_N": np.zeros((2, 3))}, "`r_N` row 0 is the zero vector"),
         ({"r_N": R_N + 1j}, "`r_N` must be real"),
+        ({"b_B": MANY, "r_N": MANY}, "have 38400 corners in 600 pairs, more than the programme can hold"),
         ({"weights": [1.0, -1.0]}, "`weights` must be >= 0"),
         ({"weights": [0.0, 0.0]}, "`weights` are all zero"),
         ({"weights": [1.0]}, "`weights` must hold one weight per vector pair"),

@@ -11,7 +11,7 @@ from optsat.estimators.attitude_bank import AttitudeBank
 from optsat.estimators.attitude_bank_model import attitude_bank_model
 from optsat.estimators.bank_model import BankModel
 from optsat.estimators.bank_result import BankResult
-from optsat.estimators.bank_run import run_bank, sorted_samples
+from optsat.estimators.bank_run import logs_together, run_bank, sorted_samples, stacked
 from optsat.kernels.kernel import Kernel
 from optsat.kernels.open_kernel import make_kernel
 from optsat.models.parts import PRESSURE
@@ -50,22 +50,13 @@ class AttitudeBankFilter:
         if (np.abs(length - 1.0) > 1e-6).any():
             row = int(np.argmax(np.abs(length - 1.0)))
             raise InputError(f"`q_BN` must be unit quaternions (scalar last): row {row} has length {length[row]:.6g}.")
-        structure, runs = self.model.structure, len(q)
-        failed = np.arange(structure.modes) >> np.arange(structure.bits)[:, None] & 1 == 1
-        prior = np.where(failed, self.bank.fault_prior, 1.0 - self.bank.fault_prior).prod(axis=0)
         known = {
-            "probability": prior,
-            "covariance": self.model.covariance_at_start(),
             "q_BN": q / length[:, None],
             "omega_BN_B": omega,
-            "last_star_BN": np.array([0.0, 0.0, 0.0, 1.0]),
+            "last_star_BN": np.broadcast_to([0.0, 0.0, 0.0, 1.0], (len(q), 4)),
             "last_command_B": command,
         }
-        ports = self.kernel.record.inputs[: len(self.kernel.record.inputs) - len(self.model.inputs)]
-        return {
-            port.name: np.broadcast_to(known.get(port.name, np.zeros(port.shape)), (runs, *port.shape)).copy()
-            for port in ports
-        }
+        return self.model.state_at_start(known, self.bank.fault_prior)
 
     def run(
         self,
@@ -85,9 +76,7 @@ class AttitudeBankFilter:
         InputError : the logs differ in length or lack a sensor of the bank, or the first row has no valid sample to
             start from. BankFailedError : a number is beyond all measure.
         """
-        logs = [telemetry] if isinstance(telemetry, Telemetry) else list(telemetry)
-        if not logs or len({len(log) for log in logs}) != 1:
-            raise InputError(f"Logs that run together must have equally many rows, got {[len(log) for log in logs]}.")
+        logs = logs_together(telemetry)
         samples = sorted_samples(self.model, {name: self._stacked(logs, name) for name in self._arrays()})
         command = np.stack([log.command_torque_B for log in logs])
         first = self._first(samples.values, samples.received[:, 0] & ~samples.invalid[:, 0], q_BN, omega_BN_B)
@@ -107,14 +96,7 @@ class AttitudeBankFilter:
         return {device.port.name: known[device.port.name] for device in self.model.samples.devices}
 
     def _stacked(self, logs: Sequence[Telemetry], port: str) -> Array:
-        name = self._arrays()[port]
-        for number, log in enumerate(logs):
-            if getattr(log, name) is None:
-                raise InputError(
-                    f"Log {number} has no `{name}`, which the bank needs. Give it rows of NaN, or leave that sensor "
-                    "out of the bank."
-                )
-        found = np.stack([np.asarray(getattr(log, name)).reshape(len(log), -1) for log in logs])
+        found = stacked(logs, self._arrays()[port])
         if port == "pressure_B":
             found = found[..., [PRESSURE.index(part) for part in self.bank.channels if part in PRESSURE]]
         return found

@@ -76,6 +76,25 @@ class BankModel:
             covariance[e * (e + 1) // 2 + e] = np.where(failed[bit], variance, 0.0)
         return covariance
 
+    def state_at_start(self, known: Mapping[str, Array], fault_prior: float) -> dict[str, Array]:
+        """Return the kernel's state of N runs by port: `known` values (N, ...), zero deviations, independent faults.
+
+        fault_prior : probability of each fault
+        """
+        structure, runs = self.structure, len(next(iter(known.values())))
+        failed = np.arange(structure.modes) >> np.arange(structure.bits)[:, None] & 1 == 1
+        prior = np.where(failed, fault_prior, 1.0 - fault_prior).prod(axis=0)
+        shared = {
+            "probability": prior,
+            "mean": np.zeros((structure.states, structure.modes)),
+            "covariance": self.covariance_at_start(),
+            **{port.name: np.zeros(port.shape) for port in (*self.reference, *self.carried)},
+        }
+        return {
+            name: known[name].copy() if name in known else np.broadcast_to(value, (runs, *value.shape)).copy()
+            for name, value in shared.items()
+        }
+
     def _example(self, rng: np.random.Generator) -> Array:
         modes, n = self.structure.modes, self.structure.states
         spread = np.array([*self.spread, *(variance**0.5 for _, variance in self.structure.actuated)])

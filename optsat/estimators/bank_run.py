@@ -1,7 +1,7 @@
 """Bank run: a bank of hypotheses over logs of samples, one run or many side by side."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from optsat.estimators.bank_model import BankModel
 from optsat.estimators.bank_result import BankResult, statuses
 from optsat.kernels.kernel import Kernel
 from optsat.kernels.status import Status
+from optsat.records.telemetry import Telemetry
 
 GAP = 5.0
 """Sample times without a row, from which on what was known before is widened."""
@@ -41,8 +42,8 @@ class Samples:
     rescaled: NDArray[np.int64]
 
 
-def sorted_samples(model: BankModel, given: Mapping[str, Array | None]) -> Samples:
-    """Return what arrays (N, T, k) by port hold; None is a device that is silent throughout.
+def sorted_samples(model: BankModel, given: Mapping[str, Array]) -> Samples:
+    """Return what arrays (N, T, k) by port hold.
 
     NaN is a missing sample of its channel, infinity too, and counted; a quaternion off by more than 0.1 is invalid.
 
@@ -50,13 +51,12 @@ def sorted_samples(model: BankModel, given: Mapping[str, Array | None]) -> Sampl
     ------
     InputError : an array has another shape.
     """
-    shape = next(value.shape[:2] for value in given.values() if value is not None)
+    shape = next(iter(given.values())).shape[:2]
     values, received, invalid = {}, [], []
     not_finite, rescaled = np.zeros(shape[0], np.int64), np.zeros(shape[0], np.int64)
     for device in model.samples.devices:
         wanted = (*shape, device.port.size)
-        raw = given[device.port.name]
-        array = np.full(wanted, np.nan) if raw is None else np.asarray(raw, dtype=np.float64)
+        array = np.asarray(given[device.port.name], dtype=np.float64)
         if array.shape != wanted:
             raise InputError(f"`{device.port.name}` must have shape {wanted} [{device.port.unit}], got {array.shape}.")
         not_finite += np.isinf(array).sum(axis=(1, 2))
@@ -71,6 +71,35 @@ def sorted_samples(model: BankModel, given: Mapping[str, Array | None]) -> Sampl
         received.append(there)
         invalid.append(bad)
     return Samples(values, np.concatenate(received, -1), np.concatenate(invalid, -1), not_finite, rescaled)
+
+
+def logs_together(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
+    """Return one log or several of equally many rows as a list.
+
+    Raises
+    ------
+    InputError : none, or their lengths differ.
+    """
+    logs = [telemetry] if isinstance(telemetry, Telemetry) else list(telemetry)
+    if not logs or len({len(log) for log in logs}) != 1:
+        raise InputError(f"Logs that run together must have equally many rows, got {[len(log) for log in logs]}.")
+    return logs
+
+
+def stacked(logs: Sequence[Telemetry], name: str) -> Array:
+    """Return an array of the telemetry of all logs, (N, T, k).
+
+    Raises
+    ------
+    InputError : a log has no such sensor.
+    """
+    for number, log in enumerate(logs):
+        if getattr(log, name) is None:
+            raise InputError(
+                f"Log {number} has no `{name}`, which the bank needs. Give it rows of NaN, or leave that sensor "
+                "out of the bank."
+            )
+    return np.stack([np.asarray(getattr(log, name)).reshape(len(log), -1) for log in logs])
 
 
 def run_bank(

@@ -85,7 +85,7 @@ static void KERNEL_find_deviations(KERNEL_work_t *work)
     for (int32_t b = 0; b < KERNEL_BITS; ++b) {
         os_real_t sum = (os_real_t)0;
         for (int32_t j = 0; j < KERNEL_MODES; ++j) {
-            sum += (((j >> b) & 1) != 0) ? work->probability[j] : (os_real_t)0;
+            sum += KERNEL_has_bit(j, b) ? work->probability[j] : (os_real_t)0;
         }
         work->failing[b] = sum;
     }
@@ -95,12 +95,12 @@ static void KERNEL_find_deviations(KERNEL_work_t *work)
         os_real_t mean = (os_real_t)0;
         os_real_t spread = (os_real_t)0;
         for (int32_t j = 0; j < KERNEL_MODES; ++j) {
-            const os_real_t part = (((j >> bit) & 1) != 0) ? work->probability[j] : (os_real_t)0;
+            const os_real_t part = KERNEL_has_bit(j, bit) ? work->probability[j] : (os_real_t)0;
             mean += part * work->mean[e][j];
         }
         mean /= work->failing[bit];
         for (int32_t j = 0; j < KERNEL_MODES; ++j) {
-            const os_real_t part = (((j >> bit) & 1) != 0) ? work->probability[j] : (os_real_t)0;
+            const os_real_t part = KERNEL_has_bit(j, bit) ? work->probability[j] : (os_real_t)0;
             const os_real_t apart = work->mean[e][j] - mean;
             spread += part * (work->covariance[KERNEL_at(e, e)][j] + (apart * apart));
         }

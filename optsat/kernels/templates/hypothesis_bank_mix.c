@@ -4,13 +4,19 @@ static int32_t KERNEL_at(int32_t i, int32_t j)
     return (i >= j) ? (((i * (i + 1)) / 2) + j) : (((j * (j + 1)) / 2) + i);
 }
 
+/* Whether fault `bit` is there in a mode. */
+static bool KERNEL_has_bit(int32_t mode, int32_t bit)
+{
+    return (((uint32_t)mode >> (uint32_t)bit) & 1U) != 0U;
+}
+
 /* A step of the command moves what a failed axis deviates by, by a part of the step that nobody knows. */
 static void KERNEL_step_command(KERNEL_work_t *work, const os_real_t *jump, const os_real_t *spread)
 {
     for (int32_t a = 0; a < KERNEL_ACTUATED; ++a) {
         const int32_t e = KERNEL_FIRST_ACTUATED + a;
         for (int32_t j = 0; j < KERNEL_MODES; ++j) {
-            const bool is_failed = ((j >> KERNEL_BIT_OF_ACTUATED[a]) & 1) != 0;
+            const bool is_failed = KERNEL_has_bit(j, KERNEL_BIT_OF_ACTUATED[a]);
             work->mean[e][j] -= is_failed ? jump[a] : (os_real_t)0;
             work->covariance[KERNEL_at(e, e)][j] += is_failed ? spread[a] : (os_real_t)0;
         }

@@ -13,7 +13,7 @@ static void KERNEL_take_lanes(KERNEL_work_t *work, int32_t first)
     }
     for (int32_t b = 0; b < KERNEL_BITS; ++b) {
         for (int32_t l = 0; l < KERNEL_LANES; ++l) {
-            work->is_failed[b][l] = (os_real_t)(((first + l) >> b) & 1);
+            work->is_failed[b][l] = KERNEL_has_bit(first + l, b) ? (os_real_t)1 : (os_real_t)0;
         }
     }
 }
@@ -227,7 +227,8 @@ static void KERNEL_measure(
             }
         }
     }
-    const os_real_t offset = (os_real_t)(end - begin) * KERNEL_LOG_TWO_PI;
+    const int32_t rows = end - begin;
+    const os_real_t offset = (os_real_t)rows * KERNEL_LOG_TWO_PI;
     for (int32_t l = 0; l < KERNEL_LANES; ++l) {
         os_real_t argument = work->determinant[l];
         os_real_t log_determinant = (os_real_t)0;

@@ -79,7 +79,8 @@ def robust_minimax(
 
     Where the box's worst corners are proven (the function is convex in u, or rises or falls throughout) they stand in
     for the box, exactly. Elsewhere cases are added until branch and bound on intervals finds none worse by more than
-    the tolerance. `answer.bound` is then proven by that search, whatever the optimiser did.
+    the tolerance. `answer.bound` is then proven by that search, rounding included, whatever the optimiser did; at
+    proven corners it is the value as evaluated there.
 
     Returns a Solution: `answer.worst`, `answer.bound`, `answer.u`; `proof` is GLOBAL where the finite problem is proven
     and the bound is within the tolerance of it, STATIONARY or FEASIBLE by the finite problem where only the inner

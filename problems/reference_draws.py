@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from optsat.arrays import Array
@@ -21,6 +20,8 @@ class Drawn:
 
 def _convex_term(rng: np.random.Generator, x: Any, centre: Array) -> Any:
     """Return a convex function of one of six kinds, smooth at the centre."""
+    import casadi as ca
+
     n = len(centre)
     kind = rng.integers(6)
     a = rng.standard_normal(n)
@@ -44,6 +45,8 @@ def convex_problem(rng: np.random.Generator) -> Drawn:
 
     A linear row and a bound press in some draws; idle rows lie below the factor.
     """
+    import casadi as ca
+
     n = int(rng.integers(1, 6))
     x = ca.SX.sym("x", n)
     at = rng.standard_normal(n) * 10 ** rng.uniform(-1, 1)
@@ -80,6 +83,8 @@ def convex_problem(rng: np.random.Generator) -> Drawn:
 
 def nonconvex_problem(rng: np.random.Generator) -> Drawn:
     """Return a min-max of waves, saddles and products of two unknowns within bounds."""
+    import casadi as ca
+
     x = ca.SX.sym("x", 2)
     objectives = []
     for _ in range(int(rng.integers(1, 4))):

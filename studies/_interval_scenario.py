@@ -15,6 +15,7 @@ from optsat.problems.interval_wahba import IntervalWahba
 from optsat.solution import Proof
 from optsat.solve import solve
 from optsat.solvers.ipopt import Ipopt
+from optsat.solvers.sqp import Sqp
 
 PRINTED_R_N = np.array([[-0.54, -0.326, 0.775], [-0.673, 0.000133, 0.74]])
 PRINTED_B_B = np.array([[-0.776, -0.46, 0.43], [-0.927, 0.01, 0.374]])
@@ -80,9 +81,15 @@ def raw_boxes(b_B: Array, r_N: Array) -> Boxes | None:
 
 
 def min_max(boxes: Boxes | None, *, absolute: bool = True, search_fraction: float | None = None) -> Array | None:
-    """Return the attitude of the paper's min-max, None where there is no box or no feasible point."""
+    """Return the attitude of the paper's min-max by the first engine that ends with a proof.
+
+    None where there is no box, or no engine ends at a stationary point.
+    """
     if boxes is None:
         return None
     problem = IntervalWahba(boxes.b_B, boxes.r_N, absolute=absolute, search_fraction=search_fraction)
-    solution = solve(problem, Ipopt())
-    return solution.answer.q_BN if solution.proof in (Proof.FEASIBLE, Proof.STATIONARY, Proof.GLOBAL) else None
+    for engine in (Ipopt(), Sqp("daqp"), Sqp("ipqp")):
+        solution = solve(problem, engine)
+        if solution.proof in (Proof.STATIONARY, Proof.GLOBAL):
+            return solution.answer.q_BN
+    return None

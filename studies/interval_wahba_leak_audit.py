@@ -197,7 +197,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     axes.set_yticks(range(len(names)), [ROWS[name] for name in names], fontsize=8)
     axes.invert_yaxis()
     axes.set_xlim(0, 1.15 * axes.get_xlim()[1])
-    axes.set_xlabel("attitude error [deg]: mean, and one standard deviation to either side")
+    axes.set_xlabel("attitude error [deg]: mean and standard deviation")
     axes.set_title("Who sees the answer, and what it is worth")
     canvas.legend(frameon=False, loc="outside lower center", ncols=3)
     write_svg(canvas, path)

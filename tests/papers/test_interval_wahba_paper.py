@@ -77,6 +77,18 @@ def test_table_1_over_a_few_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     _drawn(interval_wahba_table1.study, result.rows, tmp_path / "table.svg")
 
 
+def test_a_draw_that_was_not_solved_fails_the_bar_and_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unsolved(boxes: object, *, absolute: bool = True, search_fraction: float | None = None) -> Array | None:
+        return _interval_scenario.exact_attitude() if absolute else None
+
+    monkeypatch.setattr(_interval_scenario, "min_max", unsolved)
+    row = interval_wahba_table1.run({"optimise": True, "search": False}, np.random.default_rng(0))
+    figures = interval_wahba_table1.metrics([{**row, "min_max_from_q_deg": 0.0}])
+    assert figures["min_max_not_solved"] == 1
+    verdicts = {claim.id: claim.verdict for claim in interval_wahba_table1.claims(figures)}
+    assert verdicts["degeneracy"] is Verdict.FAILS
+
+
 def test_leak_audit_over_a_few_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(interval_wahba_leak_audit, "SEARCH_DRAWS", 0)
     result = run_study(interval_wahba_leak_audit.study, 12, seed=0)

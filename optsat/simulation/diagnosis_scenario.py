@@ -139,7 +139,7 @@ class DiagnosisScenario:
     def grid(self) -> Array:
         """Return the times (T,) of the rows before jitter and gaps [s]."""
         count = math.floor(self.duration / self.dt * (1 + 1e-12)) + 1
-        return np.asarray(np.round(self.dt * np.arange(count), _DIGITS))
+        return np.asarray(np.round(self.dt * np.arange(count), _DIGITS), dtype=np.float64)
 
 
 def scenario_s0(tumbling: bool = True) -> DiagnosisScenario:

@@ -43,7 +43,7 @@ def test_the_printed_sign_leads_into_the_earth() -> None:
 
 
 def test_gravitational_parameters_differ_by_half_a_millimetre() -> None:
-    assert MU == pytest.approx(3.985744e14, rel=1e-6)
+    assert abs(MU / 3.985744e14 - 1) < 1e-6
     difference = abs(MU - GRAVITATIONAL_PARAMETER) / float(R0 @ R0)
     assert difference == pytest.approx(0.57e-3, abs=5e-6)
 
@@ -134,7 +134,7 @@ def test_attitude_against_an_adaptive_integrator() -> None:
         q = x[:4]
         vector = 0.5 * (q[3] * w - np.cross(w, q[:3]))
         spin = np.linalg.solve(J, np.array([1.0, 2.0, -3.0]) - np.cross(w, J @ w))
-        return np.concatenate((vector, [-0.5 * w @ q[:3]], spin))
+        return np.asarray(np.concatenate((vector, [-0.5 * w @ q[:3]], spin)), dtype=np.float64)
 
     start = np.concatenate((quaternion.identity(), [0.3, -0.2, 0.5]))
     reference = solve_ivp(rates, (0, 10), start, "DOP853", rtol=1e-13, atol=1e-13).y[:, -1]

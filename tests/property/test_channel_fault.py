@@ -10,7 +10,7 @@ from optsat.attitude import quaternion
 from optsat.errors import InputError
 from optsat.models.channel_fault import noise_components, spoiled
 from optsat.models.draws import rotations
-from optsat.models.faults import Fault, SensorFaultKind, ThrusterFaultKind, value_count
+from optsat.models.faults import Fault, SensorFaultKind, ThrusterFaultKind, Window, value_count
 from optsat.models.parts import Part
 
 K = SensorFaultKind
@@ -33,7 +33,7 @@ def cases(draw: st.DrawFn, *kinds: SensorFaultKind) -> tuple[Fault, Array, Array
     return fault, t, readings, rng.normal(size=readings.shape)
 
 
-def inside(fault: Fault, t: Array) -> Array:
+def inside(fault: Fault, t: Array) -> Window:
     return np.asarray((t >= fault.start_s) & (t < fault.stop_s))
 
 
@@ -63,7 +63,7 @@ def test_constants_do_not_depend_on_the_readings(case: tuple[Fault, Array, Array
 @given(cases(K.BIAS, K.DRIFT, K.NOISE))
 def test_shifts_add_to_the_reading_or_turn_the_attitude(case: tuple[Fault, Array, Array, Array]) -> None:
     fault, t, readings, noise = case
-    at = inside(fault, t) & ~np.isnan(readings).any(axis=-1)
+    at = np.asarray(inside(fault, t) & ~np.isnan(readings).any(axis=-1))
     sent = spoiled(fault, t, readings, noise)
     np.testing.assert_array_equal(np.isnan(sent), np.isnan(readings))
     value = np.array(fault.value)

@@ -41,7 +41,7 @@ def test_what_is_written_reads_back_to_the_bit(tmp_path: Path) -> None:
     assert (back.epoch, back.source) == (written.epoch, written.source)
     assert written.equals(full(gyro_omega_BN_B=missing, star_q_BN=star))
     assert not written.equals(full())
-    assert not written.equals(full(gps_r_N=None))
+    assert not full().equals(full(gps_r_N=None))
 
 
 def test_sensors_that_are_not_there_stay_so(tmp_path: Path) -> None:

@@ -112,7 +112,8 @@ def test_true_motion_against_an_adaptive_integrator(scenario: DiagnosisScenario)
         q, w = x[:4], x[4:7]
         vector, scalar = 0.5 * (q[3] * w - np.cross(w, q[:3])), -0.5 * w @ q[:3]
         spin = np.linalg.solve(J, np.array([0, 0, torque_z]) + disturbance - np.cross(w, J @ w))
-        return np.concatenate((vector, [scalar], spin, x[10:], -MU * x[7:10] / np.linalg.norm(x[7:10]) ** 3))
+        pull = -MU * x[7:10] / np.linalg.norm(x[7:10]) ** 3
+        return np.asarray(np.concatenate((vector, [scalar], spin, x[10:], pull)), dtype=np.float64)
 
     x = np.concatenate((scenario.q_BN, scenario.omega_BN_B, scenario.r_N, scenario.v_N))
     for start, stop, torque_z in (

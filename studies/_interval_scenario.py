@@ -28,6 +28,9 @@ FRACTION = 0.2
 RANGE = 0.1
 """Search range of the paper about a quaternion, as a share of each component."""
 
+ENGINES = (Ipopt(), Ipopt(tolerance=1e-8), Sqp("daqp"), Sqp("ipqp"))
+"""Tried in turn: IPOPT now and then stalls just short of its tolerance, and ends at a looser one."""
+
 EQUAL = np.array([0.5, 0.5])
 
 
@@ -88,7 +91,7 @@ def min_max(boxes: Boxes | None, *, absolute: bool = True, search_fraction: floa
     if boxes is None:
         return None
     problem = IntervalWahba(boxes.b_B, boxes.r_N, absolute=absolute, search_fraction=search_fraction)
-    for engine in (Ipopt(), Sqp("daqp"), Sqp("ipqp")):
+    for engine in ENGINES:
         solution = solve(problem, engine)
         if solution.proof in (Proof.STATIONARY, Proof.GLOBAL):
             return solution.answer.q_BN

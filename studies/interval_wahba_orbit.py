@@ -24,8 +24,7 @@ from optsat.problems.interval_wahba import IntervalWahba
 from optsat.simulation.orbit_scenario import OrbitScenario
 from optsat.solution import Proof
 from optsat.solve import solve
-from optsat.solvers.ipopt import Ipopt
-from optsat.solvers.sqp import Sqp
+from optsat.studies._interval_scenario import ENGINES
 
 JULIAN_DATES = (2459294.0, 2459385.0, 2459475.5)
 VARIANTS = (("lvlh", "cap"), ("lvlh", "angle"), ("inertial", "cap"))
@@ -101,7 +100,7 @@ def min_max(b_B: Array, r_N: Array, angle_bound_rad: Array) -> tuple[Array, Proo
     half_width = angle_bound_rad[:, None] * np.sqrt(np.maximum(1 - b_B**2, 0.0))
     boxes = ComponentBox.from_half_width(b_B, half_width), ComponentBox.from_half_width(r_N, 0.0)
     problem = IntervalWahba(*boxes)
-    for engine in (Ipopt(), Sqp("daqp"), Sqp("ipqp")):
+    for engine in ENGINES:
         solution = solve(problem, engine)
         if solution.proof is Proof.GLOBAL:
             break

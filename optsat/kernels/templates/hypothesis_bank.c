@@ -42,7 +42,7 @@ typedef struct {
     os_real_t used[KERNEL_LANES];
     os_real_t weight[KERNEL_LANES];
     os_real_t gain[KERNEL_LANES];
-    os_real_t lowest[KERNEL_LANES];
+    os_real_t is_definite[KERNEL_LANES];
     os_real_t predicted[KERNEL_PREDICTED];
     os_real_t observed[KERNEL_OBSERVED];
     os_real_t argument[KERNEL_REFERENCE + KERNEL_CARRIED + KERNEL_INPUTS];
@@ -105,7 +105,7 @@ static bool KERNEL_update(KERNEL_work_t *work)
         KERNEL_predict_lanes(work, F, &F[KERNEL_F_NONZEROS]);
         for (int32_t l = 0; l < KERNEL_LANES; ++l) {
             work->lane_log[l] = (os_real_t)0;
-            work->lowest[l] = OS_REAL_MAX;
+            work->is_definite[l] = (os_real_t)1;
         }
         for (int32_t c = 0; c < KERNEL_CHANNELS; ++c) {
             const int32_t bit = KERNEL_BIT_OF_CHANNEL[c];
@@ -120,7 +120,7 @@ static bool KERNEL_update(KERNEL_work_t *work)
             }
         }
         for (int32_t l = 0; l < KERNEL_LANES; ++l) {
-            good = good && (work->lowest[l] > (os_real_t)0);
+            good = good && (work->is_definite[l] > (os_real_t)0);
         }
         KERNEL_give_lanes(work, first);
     }

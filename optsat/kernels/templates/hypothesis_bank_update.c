@@ -213,7 +213,7 @@ static void KERNEL_measure(
             work->determinant[l] *= work->variance[l];
             work->square[l] += (work->residual[l] * work->residual[l]) * inverse;
             work->weight[l] = work->used[l] * inverse;
-            work->lowest[l] = os_fmin(work->lowest[l], work->variance[l]);
+            work->is_definite[l] = (work->variance[l] > (os_real_t)0) ? work->is_definite[l] : (os_real_t)0;
         }
         for (int32_t i = 0; i < KERNEL_STATES; ++i) {
             for (int32_t l = 0; l < KERNEL_LANES; ++l) {

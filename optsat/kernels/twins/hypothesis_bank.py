@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from optsat.kernels.status import Status
 
 if TYPE_CHECKING:
     from optsat.kernels.hypothesis_bank import BankStructure
+
+
+Rows: TypeAlias = list[list[tuple[int, float]]]
+"""Columns and values of each row of a matrix."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +61,8 @@ class HypothesisBankTwin:
             P[e, e] += np.where(failed[bit], spread[a], 0.0)
         for bit in range(self.structure.bits):
             probability, mean, P = self._mixed(probability, mean, P, failed, bit, chain[bit], rest)
-        mean = np.tensordot(F, mean, 1)
-        P = np.einsum("ik,klm,jl->ijm", F, P, F)
+        mean = _product(F, mean)
+        P = _product(F, _product(F, P).transpose(1, 0, 2)).transpose(1, 0, 2)
         for e in range(self.structure.states):
             bits = [bit for bit, _ in self.structure.actuated][e - self._first :] if e >= self._first else []
             P[e, e] += noise[e] * (failed[bits[0]] if bits else 1.0)
@@ -79,13 +83,11 @@ class HypothesisBankTwin:
     def _first(self) -> int:
         return self.structure.states - len(self.structure.actuated)
 
-    def _predicted(self, numbers: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    def _predicted(self, numbers: Array) -> tuple[Rows, Array, Array, Array, Array, Array]:
         s, n, actuated = self.structure, self.structure.states, len(self.structure.actuated)
         ends = np.cumsum([len(s.F_pattern), n, 2 * s.bits, actuated, actuated])
         values, noise, chain, jump, spread, rest = np.split(numbers, ends)
-        F = np.zeros((n, n))
-        for (i, j), value in zip(s.F_pattern, values, strict=True):
-            F[i, j] = value
+        F = _rows(s.F_pattern, values, n)
         return F, noise, chain.reshape(-1, 2), jump, spread, rest
 
     def _mixed(
@@ -119,9 +121,7 @@ class HypothesisBankTwin:
         channels = len(s.channels)
         ends = np.cumsum([channels, channels, s.measured, s.measured, len(s.H_pattern)])
         kind, free, innovation, noise, values, _ = np.split(observed, ends)
-        H = np.zeros((s.measured, s.states))
-        for (i, j), value in zip(s.H_pattern, values, strict=True):
-            H[i, j] = value
+        H = _rows(s.H_pattern, values, s.measured)
         total, begin = np.zeros(modes), 0
         for c, channel in enumerate(s.channels):
             rows = slice(begin, begin + channel.rows)
@@ -133,8 +133,8 @@ class HypothesisBankTwin:
                 log_failed = self._failed_density(mean, P, H[rows], innovation[rows], noise[rows], c, free[c])
                 determinant, square = np.ones(modes), np.zeros(modes)
                 for h, z, R in zip(H[rows], innovation[rows], noise[rows], strict=True):
-                    column = np.einsum("ijm,j->im", P, h)
-                    variance, residual = R + h @ column, z - h @ mean
+                    column = _product([h], P)[0]
+                    variance, residual = R + _product([h], column)[0], z - _product([h], mean)[0]
                     if not (variance > 0.0).all():
                         return None
                     determinant *= variance
@@ -147,12 +147,12 @@ class HypothesisBankTwin:
         return total
 
     def _failed_density(
-        self, mean: Array, P: Array, H: Array, innovation: Array, noise: Array, c: int, free: float
+        self, mean: Array, P: Array, H: Rows, innovation: Array, noise: Array, c: int, free: float
     ) -> Array:
         channel = self.structure.channels[c]
         width = channel.erratic_deviation**2
-        S = np.einsum("ri,ijm,sj->mrs", H, P, H) + np.diag(noise + width)
-        z = innovation - np.einsum("ri,im->mr", H, mean)
+        S = _product(H, _product(H, P).transpose(1, 0, 2)).transpose(2, 0, 1) + np.diag(noise + width)
+        z = innovation - _product(H, mean).T
         square = np.einsum("mr,mr->m", z, np.linalg.solve(S, z[:, :, None])[:, :, 0])
         square = np.minimum(square, self.constants["FARTHEST"])
         offset = channel.rows * math.log(2.0 * math.pi) + 2.0 * math.log(2.0)
@@ -176,3 +176,19 @@ class HypothesisBankTwin:
         carried = observed[len(observed) - self.sizes["CARRIED"] :]
         parts = [probability, mean.ravel(), P[np.tril_indices(n)].ravel(), reference, carried]
         return np.concatenate([*parts, failing, deviation, variance, covariance.ravel(), [evidence]])
+
+
+def _rows(pattern: Sequence[tuple[int, int]], values: Array, count: int) -> Rows:
+    rows: Rows = [[] for _ in range(count)]
+    for (i, j), value in zip(pattern, values, strict=True):
+        rows[i].append((j, float(value)))
+    return rows
+
+
+def _product(rows: Rows, array: Array) -> Array:
+    """Matrix times the first axis of an array; what is zero by structure takes no part, not even of an infinity."""
+    found = np.zeros((len(rows), *array.shape[1:]))
+    for i, row in enumerate(rows):
+        for j, value in row:
+            found[i] = found[i] + value * array[j]
+    return found

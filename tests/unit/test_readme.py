@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 
@@ -32,13 +33,21 @@ def test_one_definition_is_called_compiled_and_differentiated(root: Path, capsys
     assert "(4, 3)" in printed
 
 
-def test_goal_attainment_reaches_the_answer_beside_it(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_goal_attainment_reaches_the_answer_beside_it(
+    root: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     code = _block((root / "README.md").read_text(encoding="utf-8"), "goal-attainment")
     space: dict[str, Any] = {}
     exec(compile(code, "README.md", "exec"), space)
     answer = space["solution"].answer
     assert answer.x == pytest.approx([2.0693664, 1.9306336], abs=1e-6)
     assert answer.factor == pytest.approx(0.14835623, abs=1e-7)
+    # between the two centres the least squares r1, r2 of the distances fulfil sqrt r1 + sqrt r2 = sqrt 2
+    assert np.sqrt(space["front"].objectives).sum(axis=1) == pytest.approx(np.sqrt(2), abs=1e-3)
+    assert space["robust"].answer.x == pytest.approx([0.5, 0.5], abs=1e-4)
+    assert space["robust"].answer.bound == pytest.approx(2.5, rel=1e-5)
+    assert (tmp_path / "front.png").stat().st_size > 5000
     assert "Proof.GLOBAL" in capsys.readouterr().out
 
 

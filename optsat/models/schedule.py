@@ -32,7 +32,7 @@ class Schedule:
         start = finite_array("start_s", self.start_s, (None,), "s")
         values = finite_array("values", self.values, (None, 3), "SI") if len(start) else np.zeros((0, 3))
         if len(values) != len(start):
-            raise InputError(f"`values` must hold one row for each of the {len(start)} starts, got {len(values)}.")
+            raise InputError(f"there must be one vector for each of the {len(start)} starts, got {len(values)}.")
         if np.any(start < 0) or np.any(np.diff(start) <= 0):
             raise InputError(f"`start_s` must increase from 0 s on, got {start.tolist()}.")
         if self.period_s != math.inf:

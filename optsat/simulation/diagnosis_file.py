@@ -25,6 +25,20 @@ _KINDS: dict[str, SensorFaultKind | ThrusterFaultKind] = {
     kind.value: kind for kinds in (SensorFaultKind, ThrusterFaultKind) for kind in kinds
 }
 
+_ENTRIES = {
+    "q_BN": "motion.q_BN",
+    "omega_BN_B": "motion.omega_BN_B_rad_s",
+    "r_N": "motion.r_N_m",
+    "v_N": "motion.v_N_m_s",
+    "specific_force_B": "forces.acceleration_m_s2",
+    "command_torque_B": "commands.torque_N_m",
+    "inertia_B": "body.inertia_kg_m2",
+    "greatest_torque": "greatest_torque_N_m",
+    "axis_B": "axis",
+    "orbit": "motion.orbit",
+}
+"""What the file calls the arguments that a scenario refuses."""
+
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Four = Annotated[list[float], Field(min_length=4, max_length=4)]
 
@@ -94,6 +108,8 @@ class _Star(_Sensor):
     variance: Four = [2.29e-7, 1.95e-7, 3.85e-7, 1.98e-7]
 
     def sensor(self) -> StarTracker:
+        if min(self.variance) <= 0:
+            raise InputError(f"`variance` must be > 0 in all components, got {self.variance}.")
         return StarTracker(np.diag(self.variance))
 
 
@@ -232,6 +248,8 @@ def parse_diagnosis_scenario(text: str, file: str = "scenario") -> DiagnosisScen
         return validated(_Scenario, text, file).scenario()
     except InputError as refused:
         said = str(refused)
+        for name, entry in _ENTRIES.items():
+            said = said.replace(f"`{name}`", f"`{entry}`")
         raise InputError(said if said.startswith(f"{file}: ") else f"{file}: {said}") from None
 
 

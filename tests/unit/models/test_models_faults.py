@@ -132,7 +132,7 @@ def test_schedule() -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (((0, 1), ((1, 2, 3),)), "one row for each of the 2 starts, got 1"),
+        (((0, 1), ((1, 2, 3),)), "one vector for each of the 2 starts, got 1"),
         (((1, 1), ((1, 2, 3), (1, 2, 3))), r"must increase from 0 s on, got \[1.0, 1.0\]"),
         (((-1,), ((1, 2, 3),)), "must increase"),
         (((0,), ((1, 2),)), r"must have shape \(m, 3\)"),

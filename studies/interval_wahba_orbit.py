@@ -100,10 +100,12 @@ def min_max(b_B: Array, r_N: Array, angle_bound_rad: Array) -> tuple[Array, Proo
     half_width = angle_bound_rad[:, None] * np.sqrt(np.maximum(1 - b_B**2, 0.0))
     boxes = ComponentBox.from_half_width(b_B, half_width), ComponentBox.from_half_width(r_N, 0.0)
     problem = IntervalWahba(*boxes)
-    for engine in ENGINES:
-        solution = solve(problem, engine)
+    first, *others = ENGINES
+    solution = solve(problem, first)
+    for engine in others:
         if solution.proof is Proof.GLOBAL:
             break
+        solution = solve(problem, engine)
     return solution.answer.q_BN, solution.proof
 
 

@@ -13,7 +13,7 @@ from optsat.errors import InfeasibleBoxError
 from optsat.problems.component_box import ComponentBox
 from optsat.problems.interval_wahba import IntervalWahba
 from optsat.solution import Proof
-from optsat.solve import solve
+from optsat.solve import Solver, solve
 from optsat.solvers.ipopt import Ipopt
 from optsat.solvers.sqp import Sqp
 
@@ -28,7 +28,7 @@ FRACTION = 0.2
 RANGE = 0.1
 """Search range of the paper about a quaternion, as a share of each component."""
 
-ENGINES = (Ipopt(), Ipopt(tolerance=1e-8), Sqp("daqp"), Sqp("ipqp"))
+ENGINES: tuple[Solver, ...] = (Ipopt(), Ipopt(tolerance=1e-8), Sqp("daqp"), Sqp("ipqp"))
 """Tried in turn: IPOPT now and then stalls just short of its tolerance, and ends at a looser one."""
 
 EQUAL = np.array([0.5, 0.5])

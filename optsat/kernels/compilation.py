@@ -48,6 +48,8 @@ def compiled(
     found = fingerprint(compiler).checked()
     # what has a status stands in loops: many operations, but little text
     optimisation = "-O2" if record.has_status or record.operations <= LARGE else "-O1"
+    # gcc keeps the sums of short loops in memory below this level
+    optimisation = "-O3" if record.has_short_loops else optimisation
     # "native" is no name of a processor: the target stands for it
     flags = (optimisation, *(f for f in found.flags if not f.endswith("=native")), *extra, *compiler.flags, *KEEP_BITS)
     width = _WIDTH.search(text)

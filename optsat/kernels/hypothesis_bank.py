@@ -202,6 +202,7 @@ def hypothesis_bank(
         ),
         operations=_operations(structure) + programs["predict"].operation_count + programs["observe"].operation_count,
         example=example,
+        has_short_loops=True,
     )
 
 

@@ -47,6 +47,7 @@ def instantiate(
     tables: Mapping[str, Sequence[int] | Sequence[float]] | None = None,
     operations: int | None = None,
     example: Example | None = None,
+    has_short_loops: bool = False,
 ) -> KernelSource:
     """Return the kernel `name` of `optsat/kernels/templates/TEMPLATE.c`.
 
@@ -94,6 +95,7 @@ def instantiate(
         operations=sum(map(operation_count, leaves.values())) if operations is None else operations,
         twin=twin,
         example=example,
+        has_short_loops=has_short_loops,
     )
 
 

@@ -133,6 +133,7 @@ def _record(source: KernelSource, real: Real, text: str) -> KernelRecord:
         has_status=source.has_status,
         libm=source.libm,
         operations=source.operations,
+        has_short_loops=source.has_short_loops,
         source=digest_of(library_text(source, real)),
         text=digest_of(text),
     )

@@ -15,6 +15,7 @@ class KernelRecord:
     source : SHA-256 of the C text for one sample at a time, the same on every machine; text : of the C text compiled
     key : SHA-256 over text, flags, compiler, target, C library and ABI
     library : SHA-256 of the compiled library; empty where none is, as is the key
+    has_short_loops : that pay to be unrolled
     width : samples in a tile; has_tiles : whether the kernel computes on tiles
     libm : C functions used whose last bits depend on the machine; none means the same bits everywhere
     operations : arithmetic operations of one sample, or of one iteration where they are not fixed
@@ -34,6 +35,7 @@ class KernelRecord:
     library: str = ""
     width: int = 1
     has_tiles: bool = False
+    has_short_loops: bool = False
     compiler: str = ""
     flags: tuple[str, ...] = ()
     target: tuple[str, ...] = ()

@@ -9,13 +9,16 @@ from optsat.arrays import Array, Mask, finite_array
 from optsat.errors import InputError
 from optsat.estimators.attitude_bank import AttitudeBank
 from optsat.estimators.attitude_bank_model import attitude_bank_model
+from optsat.estimators.bank_input import logs_together, sorted_samples, stacked
 from optsat.estimators.bank_model import BankModel
 from optsat.estimators.bank_result import BankResult
-from optsat.estimators.bank_run import logs_together, run_bank, sorted_samples, stacked
+from optsat.estimators.bank_run import run_bank
 from optsat.kernels.kernel import Kernel
 from optsat.kernels.open_kernel import make_kernel
 from optsat.models.parts import PRESSURE
 from optsat.records.telemetry import Telemetry
+
+_COMMAND_SLACK = 1e-9
 
 
 class AttitudeBankFilter:
@@ -31,15 +34,24 @@ class AttitudeBankFilter:
         self.model: BankModel = attitude_bank_model(self.bank)
         self.kernel: Kernel = make_kernel(self.model.kernel_source(f"attitude_bank_{self.model.structure.modes}"))
 
-    def start(self, q_BN: ArrayLike, omega_BN_B: ArrayLike, command_B: ArrayLike) -> dict[str, Array]:
+    def start(
+        self,
+        q_BN: ArrayLike,
+        omega_BN_B: ArrayLike,
+        command_B: ArrayLike,
+        fault_prior: ArrayLike | None = None,
+        spread: ArrayLike | None = None,
+    ) -> dict[str, Array]:
         """Return the state of N runs before their first sample, by the names of the kernel's ports.
 
         q_BN : (N, 4) [-]; omega_BN_B : (N, 3) [rad/s], both known to the priors of the bank
         command_B : (N, 3) torque commanded until then [N m]
+        fault_prior : probability of every fault, or of each; spread : deviation of rotation, rate and, where there is
+        one, bias, about each axis; both those of the bank unless given, as after an outage they may not be
 
         Raises
         ------
-        InputError : other shapes, not finite, or a quaternion that is not of length 1.
+        InputError : other shapes, not finite, a quaternion that is not of length 1, or no probability.
         """
         q = finite_array("q_BN", q_BN, (None, 4))
         omega, command = (
@@ -56,7 +68,7 @@ class AttitudeBankFilter:
             "last_star_BN": np.broadcast_to([0.0, 0.0, 0.0, 1.0], (len(q), 4)),
             "last_command_B": command,
         }
-        return self.model.state_at_start(known, self.bank.fault_prior)
+        return self.model.state_at_start(known, self.bank.fault_prior if fault_prior is None else fault_prior, spread)
 
     def run(
         self,
@@ -64,12 +76,14 @@ class AttitudeBankFilter:
         q_BN: ArrayLike | None = None,
         omega_BN_B: ArrayLike | None = None,
         keep_modes: bool = True,
+        after: BankResult | None = None,
     ) -> BankResult:
         """Return what the bank finds in one log, or in N logs of equally many rows.
 
         q_BN : (4,) or (N, 4), omega_BN_B : (3,) or (N, 3) [rad/s] : at the first row, as well known as the bank's
         priors say; unless given, those that star tracker and gyro send there
         keep_modes : whether the result holds the probability of every mode at every row
+        after : result of the rows before these, to go on from; then no start is needed
 
         Raises
         ------
@@ -79,11 +93,41 @@ class AttitudeBankFilter:
         logs = logs_together(telemetry)
         samples = sorted_samples(self.model, {name: self._stacked(logs, name) for name in self._arrays()})
         command = np.stack([log.command_torque_B for log in logs])
-        first = self._first(samples.values, samples.received[:, 0] & ~samples.invalid[:, 0], q_BN, omega_BN_B)
+        self._check_command(command)
+        if after is None:
+            usable = samples.received[:, 0] & ~samples.invalid[:, 0]
+            before = command[:, 0]
+            state = self.start(*self._first(samples.values, usable, q_BN, omega_BN_B), before)
+        else:
+            before, state = after.held_on["command_B"], after.state
+            if len(before) != len(logs):
+                raise InputError(f"`after` is the result of {len(before)} logs, got {len(logs)} to go on with.")
         # a row's command acts from then on, so that up to the next row is the one before
-        held = {"command_B": np.concatenate([command[:, :1], command[:, :-1]], axis=1)}
-        state = self.start(*first, command[:, 0])
-        return run_bank(self.model, self.kernel, state, np.stack([log.t for log in logs]), held, samples, keep_modes)
+        held = {"command_B": np.concatenate([before[:, None], command[:, :-1]], axis=1)}
+        return run_bank(
+            self.model,
+            self.kernel,
+            state,
+            np.stack([log.t for log in logs]),
+            held,
+            samples,
+            keep_modes,
+            after,
+            {"command_B": command[:, -1].copy()},
+        )
+
+    def _check_command(self, command: Array) -> None:
+        least = -self.bank.greatest_torque if self.bank.signed else 0.0
+        beyond = np.argwhere(
+            (command < least - _COMMAND_SLACK) | (command > self.bank.greatest_torque + _COMMAND_SLACK)
+        )
+        if len(beyond):
+            log, row, axis = (int(k) for k in beyond[0])
+            hint = "" if self.bank.signed else " Thruster pairs that also turn the other way need `signed=True`."
+            raise InputError(
+                f"`command_torque_B` must be from {least:g} to {self.bank.greatest_torque:g} N m: row {row}, axis "
+                f"{axis} of log {log} holds {command[log, row, axis]:g}.{hint}"
+            )
 
     def _arrays(self) -> dict[str, str]:
         """Return the array of the telemetry that each port of samples takes."""

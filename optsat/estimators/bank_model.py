@@ -4,8 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from optsat.arrays import Array
+from optsat.arrays import Array, finite_array
 from optsat.attitude.backend import Value
 from optsat.errors import InputError
 from optsat.estimators.bank_samples import BankSamples
@@ -64,30 +65,49 @@ class BankModel:
             self._example,
         )
 
-    def covariance_at_start(self) -> Array:
-        """Return the packed covariances (states (states + 1) / 2, modes) by the spread and the faults' priors."""
+    def covariance_at_start(self, spread: Sequence[float] | Array | None = None) -> Array:
+        """Return the packed covariances (states (states + 1) / 2, modes) by the spread and the faults' priors.
+
+        spread : deviation of each state that no actuator drives; that of the model unless given
+        """
         structure = self.structure
         failed = np.arange(structure.modes) >> np.arange(structure.bits)[:, None] & 1 == 1
         covariance = np.zeros((structure.packed, structure.modes))
-        for e, deviation in enumerate(self.spread):
+        for e, deviation in enumerate(self.spread if spread is None else spread):
             covariance[e * (e + 1) // 2 + e] = deviation**2
         for a, (bit, variance) in enumerate(structure.actuated):
             e = len(self.spread) + a
             covariance[e * (e + 1) // 2 + e] = np.where(failed[bit], variance, 0.0)
         return covariance
 
-    def state_at_start(self, known: Mapping[str, Array], fault_prior: float) -> dict[str, Array]:
+    def state_at_start(
+        self, known: Mapping[str, Array], fault_prior: ArrayLike, spread: ArrayLike | None = None
+    ) -> dict[str, Array]:
         """Return the kernel's state of N runs by port: `known` values (N, ...), zero deviations, independent faults.
 
-        fault_prior : probability of each fault
+        fault_prior : probability of every fault, or (bits,) of each
+        spread : deviation of each state that no actuator drives; that of the model unless given
+
+        Raises
+        ------
+        InputError : a probability is not in (0, 1), a deviation negative, or their number is another one.
         """
+        prior_of = finite_array("fault_prior", fault_prior)
+        wide = None if spread is None else finite_array("spread", spread, (len(self.spread),))
+        if prior_of.shape not in ((), (self.structure.bits,)):
+            raise InputError(f"`fault_prior` must be one number or ({self.structure.bits},), got {prior_of.shape}.")
+        if not ((prior_of > 0.0) & (prior_of < 1.0)).all():
+            raise InputError(f"`fault_prior` must lie between 0 and 1, ends excluded, got {prior_of.tolist()}.")
+        if wide is not None and wide.min() < 0.0:
+            raise InputError(f"`spread` must not be negative, got {wide.min():.6g} at index {wide.argmin()}.")
         structure, runs = self.structure, len(next(iter(known.values())))
         failed = np.arange(structure.modes) >> np.arange(structure.bits)[:, None] & 1 == 1
-        prior = np.where(failed, fault_prior, 1.0 - fault_prior).prod(axis=0)
+        each = np.broadcast_to(prior_of, structure.bits)[:, None]
+        prior = np.where(failed, each, 1.0 - each).prod(axis=0)
         shared = {
             "probability": prior,
             "mean": np.zeros((structure.states, structure.modes)),
-            "covariance": self.covariance_at_start(),
+            "covariance": self.covariance_at_start(wide),
             **{port.name: np.zeros(port.shape) for port in (*self.reference, *self.carried)},
         }
         return {
@@ -134,6 +154,21 @@ def checked_faults(faults: Sequence[Part | Sequence[Part]], known: Sequence[Part
     return found
 
 
+def check_chances(name: str, chances: Sequence[float]) -> None:
+    """Accept the chances per step to fail and to recover, in [0, 1], with a sum above 0 and below 1.
+
+    Raises
+    ------
+    InputError : others.
+    """
+    fail, recover = finite_array(name, chances, (2,), "-")
+    if not (fail >= 0.0 and recover >= 0.0 and 0.0 < fail + recover < 1.0):
+        raise InputError(
+            f"`{name}` must be two chances per step, to fail and to recover, in [0, 1], with a sum above 0 and below "
+            f"1, got ({fail:.6g}, {recover:.6g})."
+        )
+
+
 def pattern_of(matrix: Value) -> tuple[tuple[tuple[int, int], ...], Value]:
     """Return the places (row, column) of the structural non-zeros of a CasADi matrix, by rows, and their values."""
     import casadi as ca
@@ -144,19 +179,9 @@ def pattern_of(matrix: Value) -> tuple[tuple[tuple[int, int], ...], Value]:
 
 
 def chain_over(fail: float, recover: float, steps: Value) -> tuple[Value, Value]:
-    """Return the chances to fail and to recover over a number of steps, not always whole, of a chain with these two.
-
-    Raises
-    ------
-    InputError : a chance is outside [0, 1], or both together are not in (0, 1).
-    """
+    """Return the chances to fail and to recover over a number of steps, not always whole; see `check_chances`."""
     import casadi as ca
 
-    if not (0.0 <= fail <= 1.0 and 0.0 <= recover <= 1.0 and 0.0 < fail + recover < 1.0):
-        raise InputError(
-            f"The chances per step to fail, {fail!r}, and to recover, {recover!r}, must lie in [0, 1], with a sum "
-            "above 0 and below 1."
-        )
     total = fail + recover
     changed = (1.0 - ca.exp(float(ca.log(1.0 - total)) * steps)) / total
     return fail * changed, recover * changed

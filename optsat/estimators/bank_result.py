@@ -25,6 +25,7 @@ class ChannelStatus(IntEnum):
 
 
 Statuses = NDArray[np.int8]
+Counts = NDArray[np.int64]
 
 IN_A_ROW = 3
 """Lost samples from which on a channel is missing."""
@@ -45,6 +46,9 @@ class BankResult:
     status : (N, T, C) of `ChannelStatus`
     not_finite : (N,) samples that were infinite; rescaled : (N,) quaternions whose length was off by 1e-6 to 0.1
     after_gap : (N, T) rows after more than five sample times, where the covariance was widened as at the start
+    state : (N, ...) by port of the kernel, of the bank after the last row
+    lost_in_a_row : (N, C) samples lost up to the last row
+    held_on : (N, k) by port, inputs that hold from the last row on, such as a command
     """
 
     t: Array
@@ -59,9 +63,12 @@ class BankResult:
     covariance: Array
     log_evidence: Array
     status: Statuses
-    not_finite: NDArray[np.int64]
-    rescaled: NDArray[np.int64]
+    not_finite: Counts
+    rescaled: Counts
     after_gap: Mask
+    state: dict[str, Array]
+    lost_in_a_row: Counts
+    held_on: dict[str, Array]
 
     def probability(self, part: Part) -> Array:
         """Return the probability (N, T) that this part has failed.
@@ -105,13 +112,17 @@ class BankResult:
         raise InputError(f"The bank does not ask whether {part.value} fails; its faults are {known}.")
 
 
-def statuses(received: Mask, invalid: Mask) -> Statuses:
-    """Return the `ChannelStatus` of samples (N, T, C) from which were received and which of them are invalid."""
-    run = np.zeros((received.shape[0], received.shape[2]), dtype=np.int64)
+def statuses(received: Mask, invalid: Mask, lost_before: Counts) -> tuple[Statuses, Counts]:
+    """Return the `ChannelStatus` of samples (N, T, C), and how many were lost in a row at the end.
+
+    received : which came; invalid : which of them no healthy sensor can send
+    lost_before : (N, C) how many were lost in a row before
+    """
+    run = lost_before
     found = np.zeros(received.shape, dtype=np.int8)
     for k in range(received.shape[1]):
         run = np.where(received[:, k], 0, run + 1)
         found[:, k] = np.where(run == 0, ChannelStatus.USED, ChannelStatus.LOST)
         found[:, k][run >= IN_A_ROW] = ChannelStatus.MISSING
     found[invalid & received] = ChannelStatus.INVALID
-    return found
+    return found, run

@@ -1,105 +1,27 @@
-"""Bank run: a bank of hypotheses over logs of samples, one run or many side by side."""
+"""Bank run: a bank of hypotheses over logs of samples, one run or many side by side, whole or part after part."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optsat.arrays import Array, Mask
 from optsat.errors import InputError, OptsatError
+from optsat.estimators.bank_input import Samples
 from optsat.estimators.bank_model import BankModel
 from optsat.estimators.bank_result import BankResult, statuses
 from optsat.kernels.kernel import Kernel
 from optsat.kernels.status import Status
-from optsat.records.telemetry import Telemetry
 
 GAP = 5.0
 """Sample times without a row, from which on what was known before is widened."""
 
 _CLOCK_ROUNDING = 1e-6
 _MOST_SUBSTEPS = 1000
-_LENGTH_SLACK = 0.1
-_RESCALED = 1e-6
 
 
 class BankFailedError(OptsatError):
     """A bank met numbers that it cannot go on from; the message says in which run and row."""
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Samples of all devices, finite, by the names of their ports, and what is known of each channel's.
-
-    values : (N, T, k) by port, zero where nothing came; received, invalid : (N, T, C)
-    """
-
-    values: dict[str, Array]
-    received: Mask
-    invalid: Mask
-    not_finite: NDArray[np.int64]
-    rescaled: NDArray[np.int64]
-
-
-def sorted_samples(model: BankModel, given: Mapping[str, Array]) -> Samples:
-    """Return what arrays (N, T, k) by port hold.
-
-    NaN is a missing sample of its channel, infinity too, and counted; a quaternion off by more than 0.1 is invalid.
-
-    Raises
-    ------
-    InputError : an array has another shape.
-    """
-    shape = next(iter(given.values())).shape[:2]
-    values, received, invalid = {}, [], []
-    not_finite, rescaled = np.zeros(shape[0], np.int64), np.zeros(shape[0], np.int64)
-    for device in model.samples.devices:
-        wanted = (*shape, device.port.size)
-        array = np.asarray(given[device.port.name], dtype=np.float64)
-        if array.shape != wanted:
-            raise InputError(f"`{device.port.name}` must have shape {wanted} [{device.port.unit}], got {array.shape}.")
-        not_finite += np.isinf(array).sum(axis=(1, 2))
-        there = np.asarray(np.isfinite(array).reshape(*shape, len(device.parts), device.rows).all(axis=-1))
-        bad = np.zeros_like(there)
-        if device.port.shape == (4,):
-            with np.errstate(invalid="ignore", over="ignore"):
-                off = np.where(there[..., 0], np.abs(np.linalg.norm(array, axis=-1) - 1.0), 0.0)
-            bad[..., 0] = off > _LENGTH_SLACK
-            rescaled += ((off > _RESCALED) & ~bad[..., 0]).sum(axis=1)
-        values[device.port.name] = np.where(np.repeat(there, device.rows, axis=-1), array, 0.0)
-        received.append(there)
-        invalid.append(bad)
-    return Samples(values, np.concatenate(received, -1), np.concatenate(invalid, -1), not_finite, rescaled)
-
-
-def logs_together(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
-    """Return one log or several of equally many rows as a list.
-
-    Raises
-    ------
-    InputError : none, or their lengths differ.
-    """
-    logs = [telemetry] if isinstance(telemetry, Telemetry) else list(telemetry)
-    if not logs or len({len(log) for log in logs}) != 1:
-        raise InputError(f"Logs that run together must have equally many rows, got {[len(log) for log in logs]}.")
-    return logs
-
-
-def stacked(logs: Sequence[Telemetry], name: str) -> Array:
-    """Return an array of the telemetry of all logs, (N, T, k).
-
-    Raises
-    ------
-    InputError : a log has no such sensor.
-    """
-    for number, log in enumerate(logs):
-        if getattr(log, name) is None:
-            raise InputError(
-                f"Log {number} has no `{name}`, which the bank needs. Give it rows of NaN, or leave that sensor "
-                "out of the bank."
-            )
-    return np.stack([np.asarray(getattr(log, name)).reshape(len(log), -1) for log in logs])
 
 
 def run_bank(
@@ -110,59 +32,57 @@ def run_bank(
     held: Mapping[str, Array],
     samples: Samples,
     keep_modes: bool = True,
+    after: BankResult | None = None,
+    held_on: Mapping[str, Array] | None = None,
 ) -> BankResult:
     """Return what the bank finds in N logs.
 
     state : by port of the kernel (N, ...), at the first row before its samples
     t : (N, T), increasing [s]; held : by port (N, T, k), constant from the row before to each row
+    after : result of the rows before these, which `state` belongs to
+    held_on : what the result says of inputs that hold from the last row on
 
-    A step is at most one sample time long, longer intervals are gone through in several. After more than five sample
-    times without a row the covariance is widened as at the start, and the result says so.
+    A step is at most one sample time long; longer intervals are gone through in several, as many as the longest of the
+    runs needs. After more than five sample times without a row the covariance is widened as at the start, and the
+    result says so.
 
     Raises
     ------
     InputError : times do not increase. BankFailedError : the bank met numbers that are too large.
     """
-    steps = np.diff(t, axis=1, prepend=t[:, :1])
-    late = np.argwhere(np.asarray(steps[:, 1:] <= 0.0))
-    if len(late):
-        run, row = (int(k) for k in late[0])
-        raise InputError(
-            f"`t` must increase: row {row + 1} of run {run} holds {t[run, row + 1]}, not after the row before."
-        )
-    names = [port.name for port in kernel.record.inputs]
+    steps = np.diff(t, axis=1, prepend=t[:, :1] if after is None else after.t[:, -1:])
+    _check_times(t, steps, is_first=after is None)
     after_gap = np.asarray(steps > (GAP + _CLOCK_ROUNDING) * model.sample_time)
     widening = _widening(model)
-    current = {name: np.ascontiguousarray(value, dtype=np.float64) for name, value in state.items()}
-    nothing = np.zeros(samples.received[:, 0].shape)
+    series = {name: _by_row(value) for name, value in {**held, **samples.values}.items()}
+    received, nothing = _by_row(samples.received), np.zeros(samples.received[:, 0].shape)
+    stepper = _Stepper(kernel, state)
     kept = _Kept(model, kernel, t.shape, keep_modes)
     for k in range(t.shape[1]):
         longest = float(steps[:, k].max()) / model.sample_time
         count = min(max(1, math.ceil(longest - _CLOCK_ROUNDING)), _MOST_SUBSTEPS)
-        inputs = {name: np.ascontiguousarray(value[:, k]) for name, value in {**held, **samples.values}.items()}
+        inputs = {name: value[k] for name, value in series.items()}
         inputs["dt"] = np.ascontiguousarray(steps[:, k] / count)
+        inputs["received"] = nothing
         for _ in range(count - 1):
-            current = _stepped(kernel, names, current, {**inputs, "received": nothing}, k)[0]
+            stepper.step(inputs, k)
         if after_gap[:, k].any():
-            current["covariance"] = current["covariance"] + after_gap[:, k, None, None] * widening[None, :, None]
-        inputs["received"] = samples.received[:, k].astype(np.float64)
-        current, found = _stepped(kernel, names, current, inputs, k)
-        kept.keep(k, found)
-    return kept.result(t, samples, after_gap)
+            stepper.widen(after_gap[:, k, None, None] * widening[None, :, None])
+        inputs["received"] = received[k]
+        kept.keep(k, stepper.step(inputs, k))
+    return kept.result(t, samples, after_gap, stepper.state(), after, dict(held_on or {}))
 
 
-def _stepped(
-    kernel: Kernel, names: list[str], state: Mapping[str, Array], inputs: Mapping[str, Array], row: int
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    *results, status = kernel.batch(*((state if name in state else inputs)[name] for name in names))
-    if status.any():
-        run = int(np.argmax(status != Status.OK))
-        raise BankFailedError(
-            f"{kernel.record.name}: row {row} of run {run} ends with {Status(int(status[run])).name}; look for a "
-            "reading, a command or a time step there that is beyond all measure."
-        )
-    found = dict(zip((port.name for port in kernel.record.outputs), results, strict=True))
-    return {name: found[name] for name in state}, found
+def _check_times(t: Array, steps: Array, is_first: bool) -> None:
+    late = np.argwhere(np.asarray(steps[:, int(is_first) :] <= 0.0))
+    if len(late):
+        run, row = int(late[0, 0]), int(late[0, 1]) + int(is_first)
+        raise InputError(f"`t` must increase: row {row} of run {run} holds {t[run, row]}, not after the row before.")
+
+
+def _by_row(values: Array | Mask) -> Array:
+    """Return values (N, T, k) as (T, N, k), each row in one piece."""
+    return np.ascontiguousarray(np.moveaxis(values, 1, 0), dtype=np.float64)
 
 
 def _widening(model: BankModel) -> Array:
@@ -173,13 +93,53 @@ def _widening(model: BankModel) -> Array:
     return gained
 
 
+class _Stepper:
+    """The kernel with its state from step to step; one run takes the call, which is faster than a batch."""
+
+    def __init__(self, kernel: Kernel, state: Mapping[str, Array]) -> None:
+        self.kernel = kernel
+        self.inputs = [port.name for port in kernel.record.inputs]
+        self.outputs = [port.name for port in kernel.record.outputs]
+        self.is_alone = len(state["probability"]) == 1
+        self.current = {name: np.ascontiguousarray(value, dtype=np.float64) for name, value in state.items()}
+        if self.is_alone:
+            self.current = {name: value[0] for name, value in self.current.items()}
+
+    def step(self, inputs: Mapping[str, Array], row: int) -> dict[str, Array]:
+        if self.is_alone:
+            *results, code = self.kernel(*(self._argument(name, inputs) for name in self.inputs))
+            status = np.array([code])
+        else:
+            *results, status = self.kernel.batch(*(self._argument(name, inputs) for name in self.inputs))
+        if status.any():
+            run = int(np.argmax(status != Status.OK))
+            raise BankFailedError(
+                f"{self.kernel.record.name}: row {row} of run {run} ends with {Status(int(status[run])).name}; look "
+                "for a reading, a command or a time step there that is beyond all measure."
+            )
+        found = dict(zip(self.outputs, results, strict=True))
+        self.current = {name: found[name] for name in self.current}
+        return found
+
+    def widen(self, gained: Array) -> None:
+        self.current["covariance"] = self.current["covariance"] + (gained[0] if self.is_alone else gained)
+
+    def state(self) -> dict[str, Array]:
+        return {name: value[None] for name, value in self.current.items()} if self.is_alone else self.current
+
+    def _argument(self, name: str, inputs: Mapping[str, Array]) -> Array:
+        if name in self.current:
+            return self.current[name]
+        return np.asarray(inputs[name][0]) if self.is_alone else inputs[name]
+
+
 class _Kept:
     """Arrays over time of what a step gives."""
 
     def __init__(self, model: BankModel, kernel: Kernel, shape: tuple[int, ...], keep_modes: bool) -> None:
         self.model = model
         wanted = [*(port.name for port in model.reference), "fault_probability", "merged_covariance", "log_evidence"]
-        wanted += [*(["deviation", "deviation_variance"] if model.structure.actuated else [])]
+        wanted += ["deviation", "deviation_variance"] if model.structure.actuated else []
         wanted += ["probability"] if keep_modes else []
         self.arrays = {
             port.name: np.empty((*shape[:2], *port.shape)) for port in kernel.record.outputs if port.name in wanted
@@ -189,8 +149,18 @@ class _Kept:
         for name, array in self.arrays.items():
             array[:, k] = found[name]
 
-    def result(self, t: Array, samples: Samples, after_gap: Mask) -> BankResult:
+    def result(
+        self,
+        t: Array,
+        samples: Samples,
+        after_gap: Mask,
+        state: dict[str, Array],
+        after: BankResult | None,
+        held_on: dict[str, Array],
+    ) -> BankResult:
         model, arrays, none = self.model, self.arrays, np.zeros((*t.shape, 0))
+        before = np.zeros_like(samples.received[:, 0], dtype=np.int64) if after is None else after.lost_in_a_row
+        status, lost = statuses(samples.received, samples.invalid, before)
         return BankResult(
             t=t,
             faults=model.faults,
@@ -203,8 +173,47 @@ class _Kept:
             deviation_variance=arrays.get("deviation_variance", none),
             covariance=arrays["merged_covariance"],
             log_evidence=arrays["log_evidence"],
-            status=statuses(samples.received, samples.invalid),
+            status=status,
             not_finite=samples.not_finite,
             rescaled=samples.rescaled,
             after_gap=after_gap,
+            state=state,
+            lost_in_a_row=lost,
+            held_on=held_on,
         )
+
+
+def joined(parts: Sequence[BankResult]) -> BankResult:
+    """Return the results of one log after the other as that of the whole.
+
+    Raises
+    ------
+    InputError : there are none, or some kept the probabilities of their modes and others did not.
+    """
+    if not parts or len({part.mode_probability is None for part in parts}) != 1:
+        raise InputError("Results to be joined must be one at least, with the probabilities of all modes or of none.")
+    last = parts[-1]
+
+    def whole(name: str) -> Array:
+        return np.concatenate([getattr(part, name) for part in parts], axis=1)
+
+    return BankResult(
+        t=whole("t"),
+        faults=last.faults,
+        channels=last.channels,
+        states=last.states,
+        fault_probability=whole("fault_probability"),
+        mode_probability=None if last.mode_probability is None else whole("mode_probability"),
+        reference={name: np.concatenate([part.reference[name] for part in parts], axis=1) for name in last.reference},
+        deviation=whole("deviation"),
+        deviation_variance=whole("deviation_variance"),
+        covariance=whole("covariance"),
+        log_evidence=whole("log_evidence"),
+        status=np.concatenate([part.status for part in parts], axis=1),
+        not_finite=np.sum([part.not_finite for part in parts], axis=0),
+        rescaled=np.sum([part.rescaled for part in parts], axis=0),
+        after_gap=np.concatenate([part.after_gap for part in parts], axis=1),
+        state=last.state,
+        lost_in_a_row=last.lost_in_a_row,
+        held_on=last.held_on,
+    )

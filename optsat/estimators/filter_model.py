@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Literal, TypeAlias
 
-from optsat.attitude.backend import Value
+from optsat.attitude.backend import Value, reciprocal
 from optsat.errors import InputError
 from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, port_named
@@ -92,8 +92,8 @@ class FilterModel:
         import casadi as ca
 
         parts = parts_of(x, self.state_ports)
-        lengths = {name: ca.sqrt(ca.sumsqr(parts[name])) for name in self.unit_length}
-        return ca.vertcat(*(part / lengths[name] if name in lengths else part for name, part in parts.items()))
+        shares = {name: reciprocal(ca.sqrt(ca.sumsqr(parts[name]))) for name in self.unit_length}
+        return ca.vertcat(*(shares[name] * part if name in shares else part for name, part in parts.items()))
 
     def on_the_side_of(self, predicted: Value, z: Value) -> Value:
         """Return z with the parts of `sign_free` turned to the side of the predicted ones."""

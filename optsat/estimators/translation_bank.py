@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from optsat.estimators.attitude_bank import check_chances
-from optsat.estimators.bank_model import Fault, checked_faults
+from optsat.estimators.bank_model import Fault, check_chances, checked_faults
 from optsat.models.accelerometer import Axes, Sensed
 from optsat.models.earth import GRAVITATIONAL_PARAMETER
 from optsat.models.parameters import check_scalar

@@ -7,9 +7,10 @@ from numpy.typing import ArrayLike
 
 from optsat.arrays import Array, finite_array
 from optsat.errors import InputError
+from optsat.estimators.bank_input import logs_together, sorted_samples, stacked
 from optsat.estimators.bank_model import BankModel
 from optsat.estimators.bank_result import BankResult
-from optsat.estimators.bank_run import logs_together, run_bank, sorted_samples, stacked
+from optsat.estimators.bank_run import run_bank
 from optsat.estimators.translation_bank import TranslationBank
 from optsat.estimators.translation_bank_model import translation_bank_model
 from optsat.kernels.kernel import Kernel
@@ -49,11 +50,12 @@ class TranslationBankFilter:
     def run(
         self,
         telemetry: Telemetry | Sequence[Telemetry],
-        r_N: ArrayLike,
-        v_N: ArrayLike,
+        r_N: ArrayLike | None = None,
+        v_N: ArrayLike | None = None,
         q_BN: ArrayLike | None = None,
         specific_force_B: ArrayLike | None = None,
         keep_modes: bool = True,
+        after: BankResult | None = None,
     ) -> BankResult:
         """Return what the bank finds in one log, or in N logs of equally many rows.
 
@@ -61,6 +63,7 @@ class TranslationBankFilter:
         q_BN : (N, T, 4) attitude at every row, such as that of an attitude bank; needed where axes of B are read
         specific_force_B : (N, T, 3) of forces known on board, from the row before to each row [m/s^2]; else none
         keep_modes : whether the result holds the probability of every mode at every row
+        after : result of the rows before these, to go on from; then no start is needed
 
         Raises
         ------
@@ -79,9 +82,19 @@ class TranslationBankFilter:
             if specific_force_B is None
             else finite_array("specific_force_B", specific_force_B, (*shape, 3), "m/s^2"),
         }
-        first = [
-            np.broadcast_to(finite_array(name, value), (len(logs), 3)) for name, value in (("r_N", r_N), ("v_N", v_N))
-        ]
-        return run_bank(
-            self.model, self.kernel, self.start(*first), np.stack([log.t for log in logs]), held, samples, keep_modes
-        )
+        t = np.stack([log.t for log in logs])
+        if after is not None:
+            if len(after.t) != len(logs):
+                raise InputError(f"`after` is the result of {len(after.t)} logs, got {len(logs)} to go on with.")
+            return run_bank(self.model, self.kernel, after.state, t, held, samples, keep_modes, after)
+        if r_N is None or v_N is None:
+            raise InputError("`r_N` [m] and `v_N` [m/s] at the first row are needed to start from.")
+        state = self.start(*(_rows(name, value, len(logs)) for name, value in (("r_N", r_N), ("v_N", v_N))))
+        return run_bank(self.model, self.kernel, state, t, held, samples, keep_modes)
+
+
+def _rows(name: str, value: ArrayLike, runs: int) -> Array:
+    array = finite_array(name, value)
+    if array.shape not in ((3,), (runs, 3)):
+        raise InputError(f"`{name}` must have shape (3,) or ({runs}, 3), got {array.shape}.")
+    return np.broadcast_to(array, (runs, 3)).copy()

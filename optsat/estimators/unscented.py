@@ -57,7 +57,8 @@ def unscented_step(
     The points of P go through f; points of the predicted covariance, Q included, through h, so that a linear model
     gives the Kalman filter exactly. Where h is linear in the state, its moments are known without points, and taken.
     P = P_ - K S K^T, symmetric to the bit. S is the covariance of the innovation, log_likelihood that of the
-    innovation; definite is 1 where P, its prediction and S were positive definite.
+    innovation; definite is 1 where P, its prediction and S were positive definite. Where h is linear, the noise
+    diagonal and no weight negative, the prediction cannot be indefinite, and the variances of Q are tested instead.
 
     points : spread and weights of the sigma points
     noise : "full", Q and R are matrices of which the lower triangle is read; "diagonal", columns of variances
@@ -78,14 +79,16 @@ def unscented_step(
     predicted = model.scaled(moved.mean())
     P = symmetric(moved.covariance(centre_weight) + given.Q)
 
-    after = cholesky(P, rounding)
-    expected, covariance, cross = _measured(model.h(given.u), predicted, P, after.L, spread, centre_weight)
+    # variances and weights that are not negative make no covariance indefinite
+    surely_semidefinite = noise == "diagonal" and centre_weight >= 0
+    sound = ca.mmin(ca.diag(given.Q)) >= 0 if surely_semidefinite else None
+    expected, covariance, cross, sound = _measured(model.h(given.u), predicted, P, points, rounding, sound)
     innovation = model.on_the_side_of(expected, given.z) - expected
     S = symmetric(covariance + given.R)
     factor = cholesky(S, rounding)
     gain_root = factor.solve(cross.T).T
     whitened = factor.solve(innovation)
-    definite = ca.logic_and(before.definite, ca.logic_and(after.definite, factor.definite))
+    definite = ca.logic_and(before.definite, ca.logic_and(sound, factor.definite))
     return step_function(
         name,
         given,
@@ -99,9 +102,12 @@ def unscented_step(
 
 
 def _measured(
-    h: Callable[[Value], Value], x: Value, P: Value, L: Value, spread: float, centre_weight: float
-) -> tuple[Value, Value, Value]:
-    """Return mean and covariance of h, the lower triangle counting, and the covariance of the state with it."""
+    h: Callable[[Value], Value], x: Value, P: Value, points: SigmaPoints, rounding: float, sound: Value | None
+) -> tuple[Value, Value, Value, Value]:
+    """Return mean and covariance of h, the lower triangle counting, that of the state with it, and if P is sound.
+
+    sound : whether P is, where that is known without a factor of it
+    """
     import casadi as ca
 
     state = ca.SX.sym("state", x.numel())
@@ -109,10 +115,13 @@ def _measured(
     if ca.is_linear(image, state):
         H = ca.jacobian(image, state)
         cross = P @ H.T
-        return h(x), H @ cross, cross
-    seen = _Images.of(h, x, L, spread)
+        return h(x), H @ cross, cross, cholesky(P, rounding).definite if sound is None else sound
+    factor, n = cholesky(P, rounding), x.numel()
+    spread = points.spread(n)
+    seen = _Images.of(h, x, factor.L, spread)
     # the deviations of the points are the columns of L, so their product with those of the images is triangular
-    return seen.mean(), seen.covariance(centre_weight), L @ seen.differences().T * (0.5 / math.sqrt(spread))
+    cross = factor.L @ seen.differences().T * (0.5 / math.sqrt(spread))
+    return seen.mean(), seen.covariance(points.centre_weight(n)), cross, factor.definite
 
 
 @dataclass(frozen=True)

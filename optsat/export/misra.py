@@ -14,6 +14,7 @@ DEVIATIONS: Mapping[str, tuple[str, str]] = {
     "19.2": ("advisory", "The bits of a real number are read through a union, as C99 allows; a copy would be a call."),
     "2.4": ("advisory", "Sizes are constants of an enumeration without a name: C99 has no other for sizes of arrays."),
     "2.5": ("advisory", "The run-time headers serve all kernels; one kernel does not use every macro."),
+    "8.9": ("advisory", "The constant tables of a bank stand together at its head, also what one function reads."),
 }
 """Category and reason by rule: every deviation that flight code is allowed. No required rule is among them."""
 

@@ -4,14 +4,13 @@ Independent of the package's bank: full transition matrix, full covariances, qua
 body to inertial axes (Hamilton's product), as the specification has them.
 """
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import logsumexp
 
-from optsat.arrays import Array
+from optsat.arrays import Array, Mask
 
 FLOOR = 1e-60
 
@@ -63,33 +62,30 @@ class Outcome:
     densities: list[Array] = field(default_factory=list)
 
 
-def bit_of(mode: int, bit: int) -> int:
-    return mode >> bit & 1
+def failed_in(count: int, bit: int | None) -> Mask:
+    """Whether a fault is there, for each mode."""
+    return np.asarray(np.arange(count) >> bit & 1 == 1) if bit is not None else np.zeros(count, dtype=bool)
 
 
 def transition(chains: Sequence[tuple[float, float]]) -> Array:
     """Row i: probabilities to go from mode i to each other."""
-    modes = range(1 << len(chains))
-    matrix = np.ones((len(modes), len(modes)))
-    for i, j in itertools.product(modes, modes):
-        for bit, (fail, recover) in enumerate(chains):
-            failed, fails = bit_of(i, bit), bit_of(j, bit)
-            stay = 1.0 - (recover if failed else fail)
-            matrix[i, j] *= stay if failed == fails else 1.0 - stay
+    matrix = np.ones((1, 1))
+    for fail, recover in chains:
+        matrix = np.kron(np.array([[1.0 - fail, fail], [recover, 1.0 - recover]]), matrix)
     return matrix
 
 
 def moved_to(modes: Modes, target: int, drives: Sequence[Drive]) -> tuple[Array, Array]:
     """Means and covariances of all modes as they are in a mode whose actuators are as in `target`."""
     m, P = modes.m.copy(), modes.P.copy()
-    for i in range(len(modes.mu)):
-        for drive in drives:
-            before, after = bit_of(i, drive.bit), bit_of(target, drive.bit)
-            if not before and after:
-                P[i, drive.state, drive.state] += drive.variance
-            if before and not after:
-                m[i, drive.state] = drive.rest
-                P[i, drive.state, :] = P[i, :, drive.state] = 0.0
+    for drive in drives:
+        before, after = failed_in(len(modes.mu), drive.bit), bool(target >> drive.bit & 1)
+        if after:
+            P[~before, drive.state, drive.state] += drive.variance
+        else:
+            m[before, drive.state] = drive.rest
+            P[before, drive.state, :] = 0.0
+            P[before, :, drive.state] = 0.0
     return m, P
 
 
@@ -113,59 +109,59 @@ def dense_step(
     modes: Modes, matrix: Array, F: Array, Q: Array, drives: Sequence[Drive], channels: Sequence[DenseChannel]
 ) -> Outcome:
     """Command step, mixing, prediction, samples, posterior, merge."""
-    count, n = modes.m.shape
-    for j, drive in itertools.product(range(count), drives):
-        if bit_of(j, drive.bit):
-            modes.m[j, drive.state] -= drive.jump / 2.0
-            modes.P[j, drive.state, drive.state] += drive.jump**2 / 12.0
+    count = len(modes.mu)
+    for drive in drives:
+        failed = failed_in(count, drive.bit)
+        modes.m[failed, drive.state] -= drive.jump / 2.0
+        modes.P[failed, drive.state, drive.state] += drive.jump**2 / 12.0
     mixed = mix(modes, matrix, drives)
-    logs, densities = np.zeros(count), [np.zeros(count) for _ in channels]
-    after = Modes(mixed.mu.copy(), np.zeros((count, n)), np.zeros((count, n, n)))
-    for j in range(count):
-        m, P = F @ mixed.m[j], F @ mixed.P[j] @ F.T + np.diag(Q)
-        for drive in drives:
-            P[drive.state, drive.state] += drive.noise if bit_of(j, drive.bit) else 0.0
-        for k, channel in enumerate(channels):
-            m, P, densities[k][j] = measured(m, P, channel, channel.bit is not None and bool(bit_of(j, channel.bit)))
-        after.m[j], after.P[j] = m, P
-        logs[j] = np.log(mixed.mu[j]) + sum(density[j] for density in densities)
+    m, P = mixed.m @ F.T, F @ mixed.P @ F.T + np.diag(Q)
+    for drive in drives:
+        P[failed_in(count, drive.bit), drive.state, drive.state] += drive.noise
+    densities = []
+    for channel in channels:
+        m, P, density = measured(m, P, channel, failed_in(count, channel.bit))
+        densities.append(density)
+    logs = np.log(mixed.mu) + sum(densities)
     evidence = float(logsumexp(logs))
     mu = np.maximum(np.exp(logs - evidence), FLOOR)
-    after.mu = mu / mu.sum()
-    merged = after.mu @ after.m
-    apart = after.m - merged
-    covariance = np.tensordot(after.mu, after.P, 1) + (after.mu[:, None] * apart).T @ apart
-    bits = int(np.log2(count))
-    faults = np.array([sum(after.mu[j] for j in range(count) if bit_of(j, bit)) for bit in range(bits)])
+    after = Modes(mu / mu.sum(), m, P)
+    merged = after.mu @ m
+    apart = m - merged
+    covariance = np.tensordot(after.mu, P, 1) + (after.mu[:, None] * apart).T @ apart
+    faults = np.array([after.mu[failed_in(count, bit)].sum() for bit in range(int(np.log2(count)))])
     found = Outcome(after, mixed, mixed.mu, merged, covariance, evidence, faults, densities=densities)
     for drive in drives:
-        chosen = [j for j in range(count) if bit_of(j, drive.bit)]
-        share = after.mu[chosen] / after.mu[chosen].sum()
-        values = after.m[chosen, drive.state]
+        chosen = failed_in(count, drive.bit)
+        share, values = after.mu[chosen] / after.mu[chosen].sum(), m[chosen, drive.state]
         mean = float(share @ values)
-        variance = float(share @ (after.P[chosen, drive.state, drive.state] + (values - mean) ** 2))
+        variance = float(share @ (P[chosen, drive.state, drive.state] + (values - mean) ** 2))
         found.deviation.append((mean, variance))
     return found
 
 
-def measured(m: Array, P: Array, channel: DenseChannel, failed: bool) -> tuple[Array, Array, float]:
-    """State after a channel's sample, and the log density of the sample."""
-    if channel.kind == 0 or (channel.kind == 2 and channel.bit is None):
-        return m, P, 0.0
+def measured(m: Array, P: Array, channel: DenseChannel, failed: Mask) -> tuple[Array, Array, Array]:
+    """All modes after a channel's sample, taken as a whole, and the log density of the sample in each."""
+    if channel.kind == 0:
+        return m, P, np.zeros(len(m))
     if channel.kind == 2:
-        return m, P, 0.0 if failed else -1000.0
-    rows = len(channel.z)
-    nu = channel.z - channel.H @ m
+        return m, P, np.where(failed | (channel.bit is None), 0.0, -1000.0)
+    nu = channel.z - m @ channel.H.T
     S = channel.H @ P @ channel.H.T + np.diag(channel.R)
-    if failed:
-        wide = S + channel.B**2 * np.eye(rows)
-        square = min(float(nu @ np.linalg.inv(wide) @ nu), 36.0)
-        erratic = np.log(0.5) - 0.5 * (square + np.log(np.linalg.det(2.0 * np.pi * wide)))
-        return m, P, float(np.logaddexp(channel.free, erratic))
-    density = -0.5 * (nu @ np.linalg.inv(S) @ nu + np.log(np.linalg.det(2.0 * np.pi * S)))
+    wide = S + channel.B**2 * np.eye(len(channel.z))
+    erratic = np.log(0.5) - 0.5 * (np.minimum(distance(nu, wide), 36.0) + np.log(np.linalg.det(2.0 * np.pi * wide)))
+    healthy = -0.5 * (distance(nu, S) + np.log(np.linalg.det(2.0 * np.pi * S)))
     K = P @ channel.H.T @ np.linalg.inv(S)
-    left = np.eye(len(m)) - K @ channel.H
-    return m + K @ nu, left @ P @ left.T + K @ np.diag(channel.R) @ K.T, float(density)
+    left = np.eye(m.shape[1]) - K @ channel.H
+    updated = left @ P @ left.transpose(0, 2, 1) + K @ np.diag(channel.R) @ K.transpose(0, 2, 1)
+    moved = m + np.einsum("mij,mj->mi", K, nu)
+    density = np.where(failed, np.logaddexp(channel.free, erratic), healthy)
+    return np.where(failed[:, None], m, moved), np.where(failed[:, None, None], P, updated), density
+
+
+def distance(nu: Array, S: Array) -> Array:
+    """Squared distance in deviations, for each mode."""
+    return np.asarray(np.einsum("mi,mij,mj->m", nu, np.linalg.inv(S), nu))
 
 
 def normal(y: float, variance: float) -> float:

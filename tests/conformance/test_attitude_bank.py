@@ -71,29 +71,23 @@ def differences(result: BankResult, found: Sequence[Outcome]) -> dict[str, float
     }
 
 
-LONG = replace(
+HARD = replace(
     scenario_s1(),
     duration=8.0,
     sampling={"star": Sampling(2), "gyro": Sampling(1, 0.1)},
+    command_torque_B=Schedule((0.0, 0.7), ((0.0, 0.0, 5.0), (4.0, 0.0, 0.0)), 1.0),
     faults=(
         Fault(Part.GYRO_Y, SensorFaultKind.DEAD, 2.0, 4.0),
         Fault(Part.STAR, SensorFaultKind.FREEZE, 3.0, 6.0),
         Fault(Part.STAR, SensorFaultKind.DEAD, 6.0, 7.0),
-    ),
-)
-SHORT = replace(
-    LONG,
-    duration=1.5,
-    command_torque_B=Schedule((0.0, 0.7), ((0.0, 0.0, 5.0), (4.0, 0.0, 0.0)), 1.0),
-    faults=(
-        Fault(Part.GYRO_Y, SensorFaultKind.DEAD, 0.5, 1.2),
-        Fault(Part.STAR, SensorFaultKind.FREEZE, 0.8, 1.3),
-        Fault(Part.THRUSTER_Z, ThrusterFaultKind.OPEN, 0.3, 1.4),
+        Fault(Part.THRUSTER_Z, ThrusterFaultKind.OPEN, 1.0, 6.5),
     ),
 )
 
 
-@pytest.mark.parametrize(("faults", "scenario"), [(SENSORS, LONG), ((*SENSORS, *THRUSTERS), SHORT)])
+@pytest.mark.parametrize(
+    ("faults", "scenario"), [(SENSORS, HARD), ((*SENSORS, *THRUSTERS), HARD), ((*SENSORS, *THRUSTERS), scenario_s1())]
+)
 def test_compiled_bank_is_the_dense_one(faults: Sequence[Part], scenario: DiagnosisScenario) -> None:
     run, bank = simulated(scenario), AttitudeBankFilter(AttitudeBank(faults=faults))
     q, omega = run.truth.q_BN[0], run.truth.omega_BN_B[0]

@@ -38,7 +38,10 @@ static os_real_t KERNEL_find_posterior(KERNEL_work_t *work)
 /* Sum of a row times probabilities: a sum for each lane, and then over the lanes. */
 static os_real_t KERNEL_expect(const KERNEL_work_t *work, const os_real_t *row)
 {
-    os_real_t part[KERNEL_LANES] = { (os_real_t)0 };
+    os_real_t part[KERNEL_LANES];
+    for (int32_t l = 0; l < KERNEL_LANES; ++l) {
+        part[l] = (os_real_t)0;
+    }
     for (int32_t first = 0; first < KERNEL_MODES; first += KERNEL_LANES) {
         for (int32_t l = 0; l < KERNEL_LANES; ++l) {
             part[l] += work->probability[first + l] * row[first + l];
@@ -63,7 +66,10 @@ static void KERNEL_merge(KERNEL_work_t *work)
     }
     for (int32_t e = 0; e < KERNEL_STATES; ++e) {
         for (int32_t f = 0; f <= e; ++f) {
-            os_real_t part[KERNEL_LANES] = { (os_real_t)0 };
+            os_real_t part[KERNEL_LANES];
+            for (int32_t l = 0; l < KERNEL_LANES; ++l) {
+                part[l] = (os_real_t)0;
+            }
             for (int32_t first = 0; first < KERNEL_MODES; first += KERNEL_LANES) {
                 for (int32_t l = 0; l < KERNEL_LANES; ++l) {
                     const os_real_t spread = work->mean[e][first + l] * work->mean[f][first + l];

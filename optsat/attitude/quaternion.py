@@ -81,8 +81,8 @@ def error_angle(q_BN: Value, q_ref_BN: Value) -> Value:
 @checked(q_BN=QUATERNION, omega_BN_B=RATE)
 def derivative(q_BN: Value, omega_BN_B: Value) -> Value:
     """Return q_dot = 1/2 [omega; 0] (x) q [1/s]."""
-    o1, o2, o3 = components(omega_BN_B)
-    return 0.5 * _product(stack((o1, o2, o3, 0 * o1)), q_BN)
+    o1, o2, o3 = components(0.5 * omega_BN_B)
+    return _product(stack((o1, o2, o3, 0 * o1)), q_BN)
 
 
 @checked(rotation_vector=ANGLES)

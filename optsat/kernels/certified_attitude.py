@@ -73,6 +73,7 @@ def certified_attitude(vectors: int = 4, iterations: int = 40) -> KernelSource:
             "SHARE": programme_twin.SHARE,
         },
         twin=certified_twin.twin(n, iterations),
+        has_short_loops=True,
         operations=_OPERATIONS + _OPERATIONS_A_VECTOR * n,
     )
     return replace(source, float_ulp=_FLOAT_ULP)

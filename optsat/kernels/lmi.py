@@ -84,5 +84,6 @@ def lmi(
             Port("outcome", (), "-", lower=0.0, upper=4.0, safe=4.0),
         ),
         twin=lmi_twin.twin(m, tuple(sides), tolerance, iterations),
+        has_short_loops=True,
         operations=m * len(sides) * 4 * side**3 + m * m * length + m**3 // 3 + 24 * len(sides) * side**3,
     )

@@ -117,6 +117,7 @@ def minmax(
             Port("iterations", (), "-"),
         ),
         twin=twin(sizes, leaves, UNBOUNDED),
+        has_short_loops=True,
     )
 
 

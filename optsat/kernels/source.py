@@ -32,7 +32,7 @@ class KernelSource:
     libm : the C functions used whose last bits depend on the machine
     operations : arithmetic operations of one sample, or of one iteration where they are not fixed
     twin : the same in plain Python, where no C compiler is; None for a leaf, which CasADi runs
-    has_short_loops : over lanes of a fixed number of samples or modes, which pay to be unrolled and kept in registers
+    has_short_loops : over a small fixed number of lanes, modes or rows, which pay to be unrolled and kept in registers
     example : arguments x (k_in,) that belong together, drawn anew, where numbers drawn port by port would not
     float_ulp : how far a result in single precision may be from that of double, in units in the last place of the
         largest number that it has; more than usual where an iteration ends at rounding

@@ -18,7 +18,7 @@ Real = Literal["double", "float"]
 WIDTHS = (1, 2, 4, 8, 16)
 """Samples that one library computes at once."""
 
-LANES_ALONE = 4000
+LANES_ALONE = 6000
 """Operations above which a single sample runs through the lanes too, so that the compiler has one form to compile."""
 
 

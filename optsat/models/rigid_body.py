@@ -90,8 +90,14 @@ class RigidBody:
     def _acceleration(self, omega: Value, torque: Value) -> Value:
         import casadi as ca
 
-        J = ca.DM(self.inertia_B)
-        return ca.DM(np.linalg.inv(self.inertia_B)) @ (torque - ca.cross(omega, J @ omega))
+        J = np.asarray(self.inertia_B)
+        moments = np.diag(J)
+        if np.array_equal(J, np.diag(moments)):
+            # the cross product that CasADi cannot simplify: half the operations
+            following, last = np.roll(moments, -1), np.roll(moments, 1)
+            gyroscopic = [(following[i] - last[i]) / moments[i] * (omega[(i + 1) % 3] * omega[i - 1]) for i in range(3)]
+            return torque / ca.DM(moments) + ca.vertcat(*gyroscopic)
+        return ca.DM(np.linalg.inv(J)) @ (torque - ca.cross(omega, ca.DM(J) @ omega))
 
 
 def _physical_inertia(inertia: Array) -> Array:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from optsat.attitude.backend import Value
+from optsat.attitude.backend import Value, reciprocal
 from optsat.errors import InputError
 from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate, port_named
@@ -56,10 +56,12 @@ def rk4_step(
         k2 = rates(moved(current, k1, h / 2))
         k3 = rates(moved(current, k2, h / 2))
         k4 = rates(moved(current, k3, h))
-        mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
-        current = moved(current, mean, h)
+        sums = [a + 2 * (b + c) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+        # sixths of the step go to the states alone: time moves by the whole of it
+        advanced = moved(current, sums, h / 6)
+        current = advanced if time is None else advanced | {time: current[time] + h}
     for name in unit_length:
-        current[name] = current[name] / ca.norm_2(current[name])
+        current[name] = reciprocal(ca.norm_2(current[name])) * current[name]
     return generate(
         f"{derivative.name}_step",
         inputs=[*((port, symbols[port.name]) for port in derivative.inputs), (_DT, dt)],
@@ -87,7 +89,7 @@ def euler_step(
     rates = derivative.casadi.call(list(symbols.values()))
     after = {name: symbols[name] + dt * rate for name, rate in zip(states, rates, strict=True)}
     for name in unit_length:
-        after[name] = after[name] / ca.norm_2(after[name])
+        after[name] = reciprocal(ca.norm_2(after[name])) * after[name]
     return generate(
         f"{derivative.name}_euler_step",
         inputs=[*((port, symbols[port.name]) for port in derivative.inputs), (_DT, dt)],

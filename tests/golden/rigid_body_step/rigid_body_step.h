@@ -5,10 +5,10 @@
  * parameters    SHA-256 2cb968614c2606aa82bb5cce0e3d9f10f2ff408322b1b563f6bc1d248d7e4b6a
  *     inertia_B = [[80.0, 0.0, 0.0], [0.0, 80.0, 0.0], [0.0, 0.0, 4.0]]
  *     substeps = 1
- * body          SHA-256 f42f1eca4e77e229aac10e09fb235ccec040421617a2d61921a3b73df123acd2
+ * body          SHA-256 13f206954e79b4726aee6045da7aa9fa8644ba691e1491122c732c0c3f32338b
  * made with     optsat 0.1.0, emitter 1, CasADi ...
  * real type     double
- * operations    275: ADD 55, DIV 12, MUL 146, NEG 2, SQ 4, SQRT 1, SUB 53, TWICE 2
+ * operations    215: ADD 61, DIV 6, MUL 107, NEG 1, SQ 4, SQRT 1, SUB 29, TWICE 6
  * libm          none, so the bits are the same on every IEEE machine
  * stack         not measured: no compiler for cortex-m7 that states it
  *

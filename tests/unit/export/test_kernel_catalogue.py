@@ -26,12 +26,12 @@ OPERATIONS = {
     "quaternion_from_euler321": 49,
     "quaternion_compose": 86,
     "quaternion_error_angle": 71,
-    "rigid_body_step": 275,
+    "rigid_body_step": 215,
     "magnetic_field": 35,
     "sun": 44,
     "certified_two_vector": 1342,
-    "extended_filter_7": 4937,
-    "unscented_filter_7": 6714,
+    "extended_filter_7": 4462,
+    "unscented_filter_7": 5516,
     **{f"wahba_{n}": 403 + 21 * n for n in range(2, 11)},
 }
 

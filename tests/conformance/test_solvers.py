@@ -17,8 +17,8 @@ from optsat.attitude.davenport import rotation_matrix
 from optsat.attitude.status import AttitudeStatus
 from optsat.errors import InputError, UnsupportedFormError
 from optsat.forms import Point
-from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
 from optsat.problems.attainment import Attainment
+from optsat.problems.certified_attitude import CertifiedAttitude, CertifiedAttitudeProblem
 from optsat.problems.goal_attainment import GoalAttainment
 from optsat.problems.refined_enclosure import RefinedEnclosure
 from optsat.problems.wahba import Wahba, WahbaAttitude

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from optsat.problems.reference_draws import Drawn, convex_problem, nonconvex_problem
 
 from optsat.certificates.dual_bound import dual_bound
 from optsat.certificates.first_order import first_order
 from optsat.convex_rows import convex_rows
 from optsat.forms import Point
 from optsat.multistart import sobol_starts
+from optsat.problems.reference_draws import Drawn, convex_problem, nonconvex_problem
 from optsat.solution import Proof, Termination
 from optsat.solve import solve
 from optsat.solvers import SOLVERS

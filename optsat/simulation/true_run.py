@@ -104,26 +104,30 @@ def _march(function: GeneratedFunction, start: list[Array], by_step: dict[str, A
     # a few runs are over before a compiler would have started; a function that is used often compiles itself
     batch: Any = function.kernel().batch if runs >= _WORTH_COMPILING else None
     calls = -(-count // _AT_ONCE)
-    arguments = {name: _by_calls(values, calls) for name, values in by_step.items()}
-    kept = [np.empty((runs, 1 + calls * _AT_ONCE, len(state))) for state in start]
-    for values, state in zip(kept, start, strict=True):
+    steps = {name: _by_calls(values, calls) for name, values in by_step.items()}
+    kept = {
+        port.name: np.empty((runs, 1 + calls * _AT_ONCE, len(state)))
+        for port, state in zip(function.outputs, start, strict=True)
+    }
+    for values, state in zip(kept.values(), start, strict=True):
         values[:, 0] = state
-    states = [values[:, 0] for values in kept]
+    # by position, which is checked faster than by name
+    names = [port.name for port in function.inputs]
     for call in range(calls):
-        rows = slice(1 + call * _AT_ONCE, 1 + (call + 1) * _AT_ONCE)
+        first = call * _AT_ONCE
+        now = {name: np.ascontiguousarray(values[:, first]) for name, values in kept.items()}
+        now |= {name: values[call] for name, values in steps.items()}
+        rows = slice(first + 1, first + 1 + _AT_ONCE)
         if batch is not None:
-            named = {port.name: np.ascontiguousarray(x) for port, x in zip(function.outputs, states, strict=True)}
-            results = batch(**named, **{name: values[call] for name, values in arguments.items()}, **shared)
-            for values, result in zip(kept, results, strict=True):
+            results = batch(*(shared[name] if name in shared else now[name] for name in names))
+            for values, result in zip(kept.values(), results, strict=True):
                 values[:, rows] = result
-        else:
-            for run in range(runs):
-                named = {port.name: x[run] for port, x in zip(function.outputs, states, strict=True)}
-                results = function(**named, **{name: values[call, run] for name, values in arguments.items()}, **shared)
-                for values, result in zip(kept, results, strict=True):
-                    values[run, rows] = result
-        states = [values[:, rows.stop - 1] for values in kept]
-    return [values[:, : count + 1] for values in kept]
+            continue
+        for run in range(runs):
+            results = function(*(shared[name] if name in shared else now[name][run] for name in names))
+            for values, result in zip(kept.values(), results, strict=True):
+                values[run, rows] = result
+    return [values[:, : count + 1] for values in kept.values()]
 
 
 def _by_calls(values: Array, calls: int) -> Array:

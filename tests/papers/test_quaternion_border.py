@@ -67,7 +67,7 @@ def test_both_forms_of_the_kinematics_are_ours() -> None:
 
 def test_star_tracker_noise_stands_on_the_body_side() -> None:
     q, noise = scalar_first(COUNT), 0.1 * RNG.standard_normal((COUNT, 4))
-    nu = [*noise, 1.0, 0.0, 0.0, 0.0]
+    nu = noise + np.array([1.0, 0.0, 0.0, 0.0])
     nu /= np.linalg.norm(nu, axis=-1, keepdims=True)
     measured = StarTracker().measurement().batch(quaternion.from_scalar_first(q), np.roll(noise, -1, axis=-1))
     np.testing.assert_allclose(measured, quaternion.from_scalar_first(hamilton(q, nu)), atol=4e-16)
@@ -92,7 +92,7 @@ def test_the_additive_covariance_of_the_paper_is_an_approximation() -> None:
     R = 1e-7 * np.diag([1.98, 2.29, 1.95, 3.85])
     radial = np.eye(4) - np.outer(q, q)
     covariance = radial @ L @ R @ L.T @ radial
-    noise = [*np.roll(StarTracker().draw(RNG, 200000), 1, axis=-1), 1.0, 0.0, 0.0, 0.0]
+    noise = np.roll(StarTracker().draw(RNG, 200_000), 1, axis=-1) + np.array([1.0, 0.0, 0.0, 0.0])
     noise /= np.linalg.norm(noise, axis=-1, keepdims=True)
     sampled = np.cov((hamilton(np.broadcast_to(q, noise.shape), noise)).T)
     np.testing.assert_allclose(sampled, covariance, atol=0.02 * R.max())

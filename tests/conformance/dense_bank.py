@@ -97,11 +97,12 @@ def mix(modes: Modes, matrix: Array, drives: Sequence[Drive]) -> Modes:
     driven = sum({1 << drive.bit for drive in drives})
     for target in sorted({j & driven for j in range(count)}):
         m, P = moved_to(modes, target, drives)
-        for j in (j for j in range(count) if j & driven == target):
-            share = modes.mu * matrix[:, j] / c[j]
-            mixed.m[j] = share @ m
-            apart = m - mixed.m[j]
-            mixed.P[j] = np.tensordot(share, P, 1) + (share[:, None] * apart).T @ apart
+        into = [j for j in range(count) if j & driven == target]
+        share = (modes.mu[:, None] * matrix[:, into] / c[into]).T
+        mixed.m[into] = share @ m
+        apart = m - mixed.m[into][:, None]
+        spread = (share[:, :, None] * apart).transpose(0, 2, 1) @ apart
+        mixed.P[into] = np.tensordot(share, P, 1) + spread
     return mixed
 
 

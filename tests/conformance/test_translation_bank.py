@@ -155,7 +155,7 @@ def test_faults_are_named_and_the_orbit_is_kept() -> None:
 
 
 def test_known_thrust_is_no_fault() -> None:
-    simulated = replace(scenario(Sensed.SPECIFIC_FORCE, Axes.BODY), specific_force_B=constant(0.5, 0.0, -0.2))
+    simulated = replace(scenario(Sensed.TOTAL, Axes.BODY), specific_force_B=constant(0.5, 0.0, -0.2))
     runs, bank = simulate_many(simulated, [0]), TranslationBankFilter(translation_bank_of(simulated.spacecraft))
     run, motion = runs[0], runs.motion
     force = np.broadcast_to([0.5, 0.0, -0.2], (*runs.t.shape, 3))

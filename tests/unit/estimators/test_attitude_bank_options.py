@@ -41,9 +41,7 @@ def test_a_bias_among_the_states_is_learnt() -> None:
     assert sigma.max() < 2e-3
     np.testing.assert_allclose(bias, np.broadcast_to([0.02, -0.01, 0.015], bias.shape), rtol=0, atol=5e-3)
     assert quaternion.error_angle(found.reference["q_BN"], runs.motion.q_BN)[:, 50:].max() < 5e-3
-    # a bank that knows of none takes it for a fault
-    blind = diagnosed(AttitudeBank(faults=(Part.GYRO_Z,), gyro_deviation=0.003), runs)
-    assert blind.probability(Part.GYRO_Z)[:, 50:].mean() > 0.5 > found.probability(Part.GYRO_Z)[:, 50:].max()
+    assert found.probability(Part.GYRO_Z)[:, 50:].max() < 0.5
 
 
 def test_a_skewed_gyro_keeps_the_attitude_where_star_and_gyro_are_lost() -> None:

@@ -57,7 +57,7 @@ def runge_kutta(q: Array, w: Array, torque: Array, J: Array, T: float) -> tuple[
     c = rates(q + T / 2 * b[0], w + T / 2 * b[1], torque, J)
     d = rates(q + T * c[0], w + T * c[1], torque, J)
     q = q + T / 6 * (a[0] + 2 * b[0] + 2 * c[0] + d[0])
-    return q / np.linalg.norm(q), w + T / 6 * (a[1] + 2 * b[1] + 2 * c[1] + d[1])
+    return np.asarray(q / np.linalg.norm(q)), np.asarray(w + T / 6 * (a[1] + 2 * b[1] + 2 * c[1] + d[1]))
 
 
 def over(chain: tuple[float, float], steps: float) -> tuple[float, float]:

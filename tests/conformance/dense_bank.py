@@ -69,9 +69,9 @@ def failed_in(count: int, bit: int | None) -> Mask:
 
 def transition(chains: Sequence[tuple[float, float]]) -> Array:
     """Row i: probabilities to go from mode i to each other."""
-    matrix = np.ones((1, 1))
+    matrix: Array = np.ones((1, 1))
     for fail, recover in chains:
-        matrix = np.kron(np.array([[1.0 - fail, fail], [recover, 1.0 - recover]]), matrix)
+        matrix = np.asarray(np.kron(np.array([[1.0 - fail, fail], [recover, 1.0 - recover]]), matrix), np.float64)
     return matrix
 
 

@@ -1,5 +1,6 @@
 """The worked step of the specification, three channels on one axis: the dense bank and the compiled one."""
 
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ MERGED_P = [8.1187952812e-7, 2.4701189438e-6, 9.1899110975e-5, 4.3086006281e-5, 
 
 def start() -> Modes:
     mu = np.array(
-        [np.prod([p if mode >> bit & 1 else 1 - p for bit, p in enumerate((0.01, 0.02, 0.3))]) for mode in range(8)]
+        [prod(p if mode >> bit & 1 else 1 - p for bit, p in enumerate((0.01, 0.02, 0.3))) for mode in range(8)]
     )
     m = np.array([[0.001, 0.002, 2.0]] * 4 + [[-0.0005, -0.001, 0.5]] * 4)
     healthy = np.diag([1e-6, 1e-4, 0.0])

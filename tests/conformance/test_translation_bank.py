@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from math import prod
 
 import numpy as np
 import pytest
@@ -63,7 +64,7 @@ def moved(r: Array, v: Array, T: float) -> tuple[Array, Array]:
 def dense_run(run: DiagnosisRun, sensed: Sensed, axes: Axes) -> list[Outcome]:
     log, truth, found = run.telemetry, run.truth, []
     prior = [1e-3 if bit else 1.0 - 1e-3 for bit in (0, 1)]
-    mu = np.array([np.prod([prior[mode >> bit & 1] for bit in range(4)]) for mode in range(16)])
+    mu = np.array([prod(prior[mode >> bit & 1] for bit in range(4)) for mode in range(16)])
     modes = Modes(mu, np.zeros((16, 6)), np.tile(np.diag([1e4] * 3 + [1.0] * 3), (16, 1, 1)))
     r, v = truth.r_N[0], truth.v_N[0]
     last: list[Array | float | None] = [None] * 4

@@ -147,6 +147,10 @@ CATALOGUE: Mapping[str, Entry] = {
             128: "gyro, star tracker and thrusters axis by axis",
         }.items()
     },
+    "translation_bank_16": Entry(
+        "optsat.estimators.bank_kernels:translation_bank_16",
+        "step of 16 joint hypotheses of faults of GPS receiver and accelerometer, with position and velocity",
+    ),
 }
 """Entry by public name."""
 

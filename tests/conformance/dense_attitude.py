@@ -48,7 +48,7 @@ def logarithm(q: Array) -> Array:
 
 def rates(q: Array, w: Array, torque: Array, J: Array) -> tuple[Array, Array]:
     turn = 0.5 * product(q, np.array([0.0, *w]))
-    return turn, np.asarray(np.linalg.solve(J, torque - np.cross(w, J @ w)))
+    return turn, np.asarray(np.linalg.solve(J, torque - np.cross(w, J @ w)), np.float64)
 
 
 def runge_kutta(q: Array, w: Array, torque: Array, J: Array, T: float) -> tuple[Array, Array]:

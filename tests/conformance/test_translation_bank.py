@@ -11,15 +11,19 @@ from dense_bank import DenseChannel, Modes, Outcome, dense_step, normal, transit
 from optsat.arrays import Array
 from optsat.attitude import dcm
 from optsat.errors import InputError
+from optsat.estimators.bank_kernels import translation_bank_16
 from optsat.estimators.bank_result import BankResult
+from optsat.estimators.bank_run import joined
 from optsat.estimators.spacecraft_banks import translation_bank_of
 from optsat.estimators.translation_bank import TranslationBank
 from optsat.estimators.translation_bank_run import TranslationBankFilter
+from optsat.kernels.open_kernel import make_kernel
 from optsat.models.accelerometer import Accelerometer, Axes, Sensed
 from optsat.models.faults import Fault, SensorFaultKind
 from optsat.models.parts import Part
 from optsat.models.schedule import constant
 from optsat.models.spacecraft import SEED_GRAVITATIONAL_PARAMETER, Spacecraft
+from optsat.records.telemetry import Telemetry
 from optsat.simulation.diagnosis_run import DiagnosisRun, DiagnosisRuns, simulate_many
 from optsat.simulation.diagnosis_scenario import DiagnosisScenario, Sampling, scenario_s0
 
@@ -180,3 +184,47 @@ def test_input_is_checked() -> None:
         bank.run(run.telemetry, run.truth.r_N[0], run.truth.v_N[0])
     with pytest.raises(InputError, match="`q_BN` must have shape"):
         bank.run(run.telemetry, run.truth.r_N[0], run.truth.v_N[0], run.truth.q_BN)
+    with pytest.raises(InputError, match=r"`r_N`.* are needed"):
+        bank.run(run.telemetry, q_BN=run.truth.q_BN[None])
+    with pytest.raises(InputError, match=r"`v_N` must have shape \(3,\)"):
+        bank.run(run.telemetry, run.truth.r_N[0], np.zeros(2), run.truth.q_BN[None])
+    with pytest.raises(InputError, match="`axes` must be one of inertial, body, got 'B'"):
+        translation_bank_16(axes="B")
+
+
+def test_part_after_part_is_the_whole() -> None:
+    simulated = scenario(Sensed.TOTAL, Axes.BODY, *FAULTS)
+    run = simulate_many(simulated, [0])[0]
+    log, q = run.telemetry, run.truth.q_BN[None]
+    bank = TranslationBankFilter(translation_bank_of(simulated.spacecraft))
+    whole = bank.run(log, run.truth.r_N[0], run.truth.v_N[0], q)
+    assert log.gps_r_N is not None
+    assert log.accelerometer is not None
+    parts: list[BankResult] = []
+    for rows in (slice(0, 35), slice(35, 81)):
+        part = Telemetry(
+            log.t[rows], log.command_torque_B[rows], gps_r_N=log.gps_r_N[rows], accelerometer=log.accelerometer[rows]
+        )
+        start = {"after": parts[0]} if parts else {"r_N": run.truth.r_N[0], "v_N": run.truth.v_N[0]}
+        parts.append(bank.run(part, q_BN=q[:, rows], **start))
+    np.testing.assert_array_equal(joined(parts).fault_probability, whole.fault_probability)
+    with pytest.raises(InputError, match="result of 1 logs, got 2"):
+        bank.run([log, log], q_BN=np.concatenate([q, q]), after=parts[0])
+
+
+def test_offered_kernel_answers_as_its_twin() -> None:
+    source, rng = translation_bank_16(), np.random.default_rng(3)
+    kernel = make_kernel(source)
+    assert source.twin is not None
+    assert source.example is not None
+    for _ in range(5):
+        x = source.example(rng)
+        parts = np.split(x, np.cumsum([port.size for port in source.inputs])[:-1])
+        arguments = [part.reshape(port.shape) for part, port in zip(parts, source.inputs, strict=True)]
+        *results, status = kernel(*arguments)
+        wanted, y = source.twin(x)
+        assert status == wanted == 0
+        ends = np.cumsum([port.size for port in source.outputs])[:-1]
+        for got, expected in zip(results, np.split(y, ends), strict=True):
+            scale = float(np.abs(expected).max())
+            np.testing.assert_allclose(np.ravel(got), expected, rtol=0, atol=1e-11 * max(scale, 1e-3))

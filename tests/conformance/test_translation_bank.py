@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 from math import prod
+from typing import Any
 
 import numpy as np
 import pytest
@@ -205,7 +206,7 @@ def test_part_after_part_is_the_whole() -> None:
         part = Telemetry(
             log.t[rows], log.command_torque_B[rows], gps_r_N=log.gps_r_N[rows], accelerometer=log.accelerometer[rows]
         )
-        start = {"after": parts[0]} if parts else {"r_N": run.truth.r_N[0], "v_N": run.truth.v_N[0]}
+        start: dict[str, Any] = {"after": parts[0]} if parts else {"r_N": run.truth.r_N[0], "v_N": run.truth.v_N[0]}
         parts.append(bank.run(part, q_BN=q[:, rows], **start))
     np.testing.assert_array_equal(joined(parts).fault_probability, whole.fault_probability)
     with pytest.raises(InputError, match="result of 1 logs, got 2"):

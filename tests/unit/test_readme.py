@@ -51,6 +51,16 @@ def test_goal_attainment_reaches_the_answer_beside_it(
     assert "Proof.GLOBAL" in capsys.readouterr().out
 
 
+def test_the_bank_finds_the_faults_that_were_simulated(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code = _block((root / "README.md").read_text(encoding="utf-8"), "faults")
+    space: dict[str, Any] = {}
+    exec(compile(code, "README.md", "exec"), space)
+    found, parts = space["found"], space["Part"]
+    assert found.probability(parts.STAR)[0, [490, 520, 570]] == pytest.approx([0, 1, 0], abs=0.01)
+    assert found.probability(parts.THRUSTER_Z)[0, 400] > 0.95
+    assert capsys.readouterr().out
+
+
 def test_the_two_commands_set_up_and_run(root: Path) -> None:
     readme = (root / "README.md").read_text(encoding="utf-8")
     assert _block(readme, "main-command").rstrip().endswith("optsat demo")

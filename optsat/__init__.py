@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from optsat.determine import CertifiedBatch, certify_attitude, certify_attitude_batch, wahba, worst_case_wahba
     from optsat.errors import InputError, NotProvenError, OptsatError, RecordError, UnknownOptionError
     from optsat.estimators.attitude_series import AttitudeSeries, Window, certify_record
+    from optsat.estimators.isolability import AdditiveFault, Isolability, isolability
     from optsat.estimators.isolation import Isolation, isolate
     from optsat.export.export import Export, export_c
     from optsat.export.offered import kernel
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from optsat.statistical_bound import statistical_angle_bound
 
 _HOME = {
+    "AdditiveFault": "optsat.estimators.isolability",
     "Attainment": "optsat.problems.attainment",
     "AttitudeSeries": "optsat.estimators.attitude_series",
     "AttitudeStatus": "optsat.attitude.status",
@@ -47,6 +49,7 @@ _HOME = {
     "Export": "optsat.export.export",
     "GoalAttainment": "optsat.problems.goal_attainment",
     "InputError": "optsat.errors",
+    "Isolability": "optsat.estimators.isolability",
     "Isolation": "optsat.estimators.isolation",
     "Kernel": "optsat.kernels.kernel",
     "Minimax": "optsat.problems.minimax",
@@ -70,6 +73,7 @@ _HOME = {
     "certify_record": "optsat.estimators.attitude_series",
     "export_c": "optsat.export.export",
     "goal_attain": "optsat.attain",
+    "isolability": "optsat.estimators.isolability",
     "isolate": "optsat.estimators.isolation",
     "kernel": "optsat.export.offered",
     "make_kernel": "optsat.kernels.open_kernel",
@@ -85,6 +89,7 @@ _HOME = {
 }
 
 __all__ = [
+    "AdditiveFault",
     "Attainment",
     "AttitudeSeries",
     "AttitudeStatus",
@@ -95,6 +100,7 @@ __all__ = [
     "Export",
     "GoalAttainment",
     "InputError",
+    "Isolability",
     "Isolation",
     "Kernel",
     "Minimax",
@@ -119,6 +125,7 @@ __all__ = [
     "certify_record",
     "export_c",
     "goal_attain",
+    "isolability",
     "isolate",
     "kernel",
     "make_kernel",

@@ -26,7 +26,7 @@ REQUIRED = (
 EXTRAS = {
     "results": ("h5netcdf", "h5py", "xarray"),
     "cluster": ("distributed",),
-    "peers": ("ahrs", "bsk", "filterpy", "stonesoup"),
+    "peers": ("ahrs", "bsk", "filterpy", "pymoo", "stonesoup"),
 }
 
 

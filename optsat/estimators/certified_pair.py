@@ -120,7 +120,9 @@ def _pair_of(rows: Value, tiny: float) -> _Pair:
     import casadi as ca
 
     def unit(vector: Value) -> Value:
-        return scale(reciprocal(ca.fmax(sqrt(dot(vector, vector)), tiny)), vector)
+        length = sqrt(dot(vector, vector))
+        # of vectors so short that their squares vanish no direction is left
+        return scale((length > tiny) * reciprocal(ca.fmax(length, tiny)), vector)
 
     first, second = unit(rows[0, :].T), unit(rows[1, :].T)
     normal = cross(first, second)

@@ -1,6 +1,7 @@
 """Unscented Kalman filter in loops: the same step as `unscented_step`, small instead of fast."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from optsat.arrays import Array
 from optsat.attitude.backend import Value
@@ -12,6 +13,9 @@ from optsat.kernels.source import KernelSource
 from optsat.models.rigid_body import EXAMPLE_INERTIA
 from optsat.port import Port
 from optsat.symbolic.generated_function import GeneratedFunction, generate
+
+# two factors of covariances, each of which multiplies rounding by its condition number
+_FLOAT_ULP = 16384.0
 
 
 def unscented_loops(
@@ -58,7 +62,8 @@ def unscented_filter_7_loops(
     kappa : second spread of the sigma points
     """
     model = attitude_filter_model(inertia_B)
-    return unscented_loops(model, "unscented_filter_7_loops", SigmaPoints(alpha, beta, kappa), noise="diagonal")
+    kernel = unscented_loops(model, "unscented_filter_7_loops", SigmaPoints(alpha, beta, kappa), noise="diagonal")
+    return replace(kernel, float_ulp=_FLOAT_ULP)
 
 
 def _of_state(model: FilterModel, which: str, x: Port, result: Port) -> GeneratedFunction:

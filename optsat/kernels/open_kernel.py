@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from optsat.errors import InputError, OptsatError
+from optsat.errors import InputError, OptsatError, explain_unknown_options
 from optsat.kernels.cache import UnloadableError
 from optsat.kernels.compilation import digest_of
 from optsat.kernels.definition import Definition
@@ -51,6 +51,7 @@ def open_kernel(definition: str, real: Real = "double", math: Math = "own", **pa
     return kernel
 
 
+@explain_unknown_options
 def make_kernel(definition: Definition | KernelSource, real: Real = "double", math: Math = "own") -> Kernel:
     """Return the kernel of a symbolic function or of a kernel source, compiled unless the cache holds it.
 

@@ -15,7 +15,9 @@ from optsat.campaign.manifest import Manifest
 from optsat.campaign.runner import run_study
 from optsat.campaign.termination import terminated_as_interrupted
 
-COMMAND = "from optsat.cli import app; import optsat.campaign.catalogue as c; import slow_study as s;"
+# a shell that runs in the background hands on that SIGINT is ignored
+COMMAND = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+COMMAND += "from optsat.cli import app; import optsat.campaign.catalogue as c; import slow_study as s;"
 COMMAND += "c.load_study = lambda name: s.study; app()"
 
 

@@ -29,7 +29,7 @@ OPERATIONS = {
     "rigid_body_step": 215,
     "magnetic_field": 35,
     "sun": 44,
-    "certified_two_vector": 1342,
+    "certified_two_vector": 1350,
     "extended_filter_7": 4462,
     "unscented_filter_7": 5516,
     **{f"wahba_{n}": 403 + 21 * n for n in range(2, 11)},

@@ -4,6 +4,8 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from optsat.errors import InputError
 from optsat.estimators.isolability import AdditiveFault, Isolability, isolability
 from optsat.models.linear_discrete import LinearDiscreteModel, LinearSensor
@@ -42,6 +44,7 @@ def cheapest_added_sensor(
     window: float,
     candidates: Sequence[LinearSensor],
     simultaneous: bool = False,
+    least: float = 0.0,
 ) -> AddedSensor:
     """Return the cheapest sensors to add so that every fault is seen and no pair is confused.
 
@@ -49,6 +52,7 @@ def cheapest_added_sensor(
     by its own name to count its failure too; such a fault is left out where the sensor is not fitted.
 
     simultaneous : every fault must also be told from all the others failing together
+    least : [nats] that detection and every pair must reach besides; 0 removes exact zeros alone
 
     Raises
     ------
@@ -66,8 +70,14 @@ def cheapest_added_sensor(
     subsets = [s for k in range(len(candidates) + 1) for s in itertools.combinations(candidates, k)]
     for subset in sorted(subsets, key=lambda s: (sum(sensor.cost for sensor in s), len(s))):
         result = judged(subset)
-        if not (result.undetectable.any() or result.indistinguishable.any() or (simultaneous and result.masked.any())):
+        if _told(result, simultaneous, least):
             return AddedSensor(
                 tuple(sensor.name for sensor in subset), float(sum(s.cost for s in subset)), result, alone
             )
     return AddedSensor(None, float("inf"), judged(candidates), alone)
+
+
+def _told(result: Isolability, simultaneous: bool, least: float) -> bool:
+    zeros = result.undetectable.any() or result.indistinguishable.any() or (simultaneous and result.masked.any())
+    pairs = result.distinguishability[~np.eye(len(result.faults), dtype=bool)]
+    return not zeros and bool(np.all(result.detection >= least) and np.all(pairs >= least))

@@ -7,11 +7,12 @@ import numpy as np
 
 from optsat.arrays import Array, Mask, finite_array
 from optsat.errors import InputError
-from optsat.estimators.windowed_outputs import WindowedOutputs, windowed_outputs
+from optsat.estimators.windowed_outputs import windowed_outputs
 from optsat.models.linear_discrete import LinearDiscreteModel
 
 MOST_ROWS = 4000
-# part of a fault's own length in the outputs: an exact zero ends near 1e-30, what the table calls small near 1e-4
+DECISION_NATS = 3.0
+# part of a fault's own square in the outputs: exact zeros end near 1e-30, weak gyroscopic coupling near 1e-6
 _ZERO = 1e-13
 
 
@@ -57,6 +58,7 @@ class Isolability:
     undetectable : (f,) exact zeros of `detection`
     indistinguishable : (f, f) exact zeros of `distinguishability`, the diagonal left out
     masked : (f,) exact zeros of `against_others`
+    clear : whether every exact zero is clear of rounding; if not, take a shorter window
     """
 
     faults: tuple[str, ...]
@@ -68,10 +70,13 @@ class Isolability:
     undetectable: Mask
     indistinguishable: Mask
     masked: Mask
+    clear: bool
 
-    def groups(self, least: float = 0.0) -> tuple[tuple[str, ...], ...]:
-        """Return the ambiguity groups: faults joined by exact zeros, or by less than `least` [nats], either way."""
-        close = self.indistinguishable | (self.distinguishability < least)
+    def groups(self, least: float = DECISION_NATS) -> tuple[tuple[str, ...], ...]:
+        """Return the ambiguity groups: faults joined either way by exact zeros, or seen but less than `least` [nats] apart."""
+        # a fault too small to be seen is mistaken for none rather than for another
+        weak = (self.distinguishability < least) & (self.detection >= least)[:, None]
+        close = self.indistinguishable | (weak & ~np.eye(len(self.faults), dtype=bool))
         close = close | close.T
         left, found = list(range(len(self.faults))), []
         while left:
@@ -86,7 +91,7 @@ class Isolability:
 
     @property
     def says(self) -> tuple[str, ...]:
-        """What cannot be told, a sentence each; empty when every fault is told from all others together."""
+        """What cannot be told, or hardly with faults of this size, a sentence each; empty when everything is told."""
         sensors, span = ", ".join(self.sensors), f"{self.window:g} s"
         lines = [
             f"A fault of {name} cannot be seen at all with {sensors}: in {span} it changes nothing that an unknown "
@@ -97,7 +102,7 @@ class Isolability:
         for i, j in np.argwhere(self.indistinguishable & ~self.undetectable[:, None]):
             if not self.indistinguishable[j, i] or self.undetectable[j]:
                 lines.append(
-                    f"A fault of {self.faults[i]} cannot be told from one of {self.faults[j]} with {sensors}: whatever "
+                    f"A fault of {self.faults[i]} cannot be told from one of {self.faults[j]} with {sensors}: what "
                     f"it does to the measurements in {span}, {self.faults[j]} can do the same."
                 )
             elif i < j:
@@ -111,7 +116,28 @@ class Isolability:
             lines.append(
                 f"A fault of {self.faults[i]} is told from each other fault, but not from {others} failing together."
             )
+        lines += [
+            f"A fault of {self.faults[i]} of this size is hardly {told}: {nats:.2g} nats in {span}, a decision needs "
+            f"{DECISION_NATS:g}."
+            for i, told, nats in self._weak()
+        ]
+        if not self.clear:
+            lines.append(
+                "Rounding hides whether some zeros are exact: the window is too long for the model. Take a shorter one."
+            )
         return tuple(lines)
+
+    def _weak(self) -> list[tuple[int, str, float]]:
+        """Faults that are told by too few nats, from what, and the nats; exact zeros and what follows left out."""
+        found = []
+        for i, seen in enumerate(self.detection):
+            if seen < DECISION_NATS:
+                found += [] if self.undetectable[i] else [(i, "seen", float(seen))]
+                continue
+            for j, nats in enumerate(self.distinguishability[i]):
+                if i != j and nats < DECISION_NATS and not self.indistinguishable[i, j]:
+                    found.append((i, f"told from one of {self.faults[j]}", float(nats)))
+        return found
 
 
 def isolability(model: LinearDiscreteModel, faults: Sequence[AdditiveFault], window: float) -> Isolability:
@@ -145,11 +171,19 @@ def isolability(model: LinearDiscreteModel, faults: Sequence[AdditiveFault], win
     pairs, zeros = np.zeros((count, count)), np.zeros((count, count), dtype=bool)
     detection, undetectable = np.zeros(count), np.zeros(count, dtype=bool)
     alone, masked = np.zeros(count), np.zeros(count, dtype=bool)
+    clear = []
+
+    def nats(change: Array, *causes: Array) -> tuple[float, bool]:
+        rest, rank_is_clear = outputs.unexplained(change, *causes)
+        clear.append(rank_is_clear)
+        square = float(rest @ rest)
+        return square / 2, square <= _ZERO * float(change @ change)
+
     for i, change in enumerate(changes):
-        detection[i], undetectable[i] = _nats(outputs, change)
+        detection[i], undetectable[i] = nats(change)
         for j in (j for j in range(count) if j != i):
-            pairs[i, j], zeros[i, j] = _nats(outputs, change, maps[j])
-        alone[i], masked[i] = _nats(outputs, change, *(T for j, T in enumerate(maps) if j != i))
+            pairs[i, j], zeros[i, j] = nats(change, maps[j])
+        alone[i], masked[i] = nats(change, *(T for j, T in enumerate(maps) if j != i))
     return Isolability(
         faults=tuple(fault.name for fault in faults),
         sensors=tuple(sensor.name for sensor in model.sensors),
@@ -160,13 +194,8 @@ def isolability(model: LinearDiscreteModel, faults: Sequence[AdditiveFault], win
         undetectable=undetectable,
         indistinguishable=zeros,
         masked=masked,
+        clear=all(clear),
     )
-
-
-def _nats(outputs: WindowedOutputs, change: Array, *causes: Array) -> tuple[float, bool]:
-    rest = outputs.unexplained(change, *causes)
-    square = float(rest @ rest)
-    return square / 2, square <= _ZERO * float(change @ change)
 
 
 def _step(fault: AdditiveFault, samples: int, dt: float) -> Array:

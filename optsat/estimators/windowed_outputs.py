@@ -9,6 +9,8 @@ from optsat.models.linear_discrete import LinearDiscreteModel
 
 # singular values below this part of the largest are rounding: the columns are scaled to length 1 before
 TRUNCATION = 1e-9
+# between these, rounding and a weak but real direction look alike
+UNCLEAR = (1e-12, 1e-8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +34,21 @@ class WindowedOutputs:
         steps, outputs = np.array([way[0] for way in ways]).T, np.array([way[1] for way in ways]).T
         return self._whitened(_toeplitz(self.model, steps, outputs, self.samples))
 
-    def unexplained(self, change: Array, *causes: Array) -> Array:
-        """Return the part of a whitened change of outputs that no first state and no signal of the causes makes."""
+    def unexplained(self, change: Array, *causes: Array) -> tuple[Array, bool]:
+        """Return the part of a whitened change of outputs that no first state and no signal of the causes makes.
+
+        Also whether the rank is clear: no singular value between rounding and what is certainly real.
+        """
         columns = np.hstack([self.first_state, *causes])
         length = np.linalg.norm(columns, axis=0)
         columns = columns / np.where(length > 0.0, length, 1.0)
         basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
-        basis = basis[:, singular > TRUNCATION * singular[0]] if len(singular) and singular[0] > 0 else basis[:, :0]
+        part = singular / singular[0] if singular[0] > 0.0 else singular
+        basis = basis[:, part > TRUNCATION]
+        low, high = UNCLEAR
         rest = change - basis @ (basis.T @ change)
         # a second pass takes out what rounding has left of a long projection
-        return np.asarray(rest - basis @ (basis.T @ rest))
+        return np.asarray(rest - basis @ (basis.T @ rest)), not bool(np.any((part > low) & (part < high)))
 
     def _whitened(self, rows: Array) -> Array:
         from scipy.linalg import solve_triangular

@@ -83,6 +83,13 @@ def test_nothing_is_added_where_nothing_is_missing() -> None:
     assert answer.says == "No sensor is missing: the faults are told apart already."
 
 
+def test_a_least_of_nats_asks_for_more() -> None:
+    model, faults = single_axis(("star", "gyro")), [TORQUE, GYRO, STAR]
+    answer = cheapest_added_sensor(model, faults, 5.0, offered("second gyro", "pressure"), least=10.0)
+    assert answer.sensors == ("second gyro",)
+    assert cheapest_added_sensor(model, faults, 5.0, offered("second gyro"), least=12.0).sensors is None
+
+
 @pytest.mark.parametrize("count", [0, 11])
 def test_how_many_candidates(count: int) -> None:
     candidates = [LinearSensor(f"c{k}", [0.0, 1.0], 1.0) for k in range(count)]

@@ -73,7 +73,7 @@ class Isolability:
     clear: bool
 
     def groups(self, least: float = DECISION_NATS) -> tuple[tuple[str, ...], ...]:
-        """Return the ambiguity groups: faults joined either way by exact zeros, or seen but less than `least` [nats] apart."""
+        """Return the ambiguity groups: faults joined by exact zeros, or seen but less than `least` [nats] apart."""
         # a fault too small to be seen is mistaken for none rather than for another
         weak = (self.distinguishability < least) & (self.detection >= least)[:, None]
         close = self.indistinguishable | (weak & ~np.eye(len(self.faults), dtype=bool))

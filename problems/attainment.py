@@ -132,10 +132,10 @@ def _answer(
         soft = state.rows.weight > 0
         pressing = np.abs(slack) <= _ACTIVE
         active = sorted(set(form.objective[place[soft & pressing]].tolist()))
-        held = sorted({names[i] for i in place[~soft & pressing]}, key=names.index)
+        held = list(dict.fromkeys(names[i] for i in sorted({int(i) for i in place[~soft & pressing]})))
         for i in np.argsort(slack):
             if slack[i] < -FEASIBLE:
-                violated.setdefault(names[place[i]], float(-state.rows.slack[i]))
+                violated.setdefault(names[int(place[i])], float(-state.rows.slack[i]))
     return Attainment(
         x=x,
         objectives=objectives,

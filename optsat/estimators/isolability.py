@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from optsat.arrays import Array, Mask, finite_array
-from optsat.errors import InputError
+from optsat.errors import InputError, explain_unknown_fields, explain_unknown_options
 from optsat.estimators.windowed_outputs import windowed_outputs
 from optsat.models.linear_discrete import LinearDiscreteModel
 
@@ -16,6 +16,7 @@ DECISION_NATS = 3.0
 _ZERO = 1e-13
 
 
+@explain_unknown_fields
 @dataclass(frozen=True)
 class AdditiveFault:
     """A step that a part adds to inputs or sensors from `onset` on.
@@ -140,6 +141,7 @@ class Isolability:
         return found
 
 
+@explain_unknown_options
 def isolability(model: LinearDiscreteModel, faults: Sequence[AdditiveFault], window: float) -> Isolability:
     """Return how well each fault is detected and told from the others over a window.
 

@@ -169,7 +169,7 @@ def test_misspelt_options_offer_the_nearest(call: Call, args: tuple[Any, ...], t
 
 # what optsat returns and raises, and nobody calls
 NOT_CALLED = {"AttitudeSeries", "AttitudeStatus", "CertifiedAttitude", "CertifiedBatch", "Export"} | {
-    *("Attainment", "Isolation", "Kernel", "ParetoFront", "ParetoPoint", "Proof", "WorstCase"),
+    *("Attainment", "Isolability", "Isolation", "Kernel", "ParetoFront", "ParetoPoint", "Proof", "WorstCase"),
     # their options are those of the definition, and refused with it
     *("kernel", "open_kernel"),
     *("Solution", "Termination", "WahbaAttitude"),

@@ -63,6 +63,10 @@ def test_a_dishonest_answer_is_found_out() -> None:
             replace(found, answer=replace(answer, multipliers=1.1 * answer.multipliers)),
             optimum,
         ),
+        "feasible but outside": (
+            replace(found, proof=Proof.FEASIBLE, residuals={**found.residuals, "violation": 1e-7}),
+            optimum,
+        ),
         "no answer where there is one": (replace(found, proof=Proof.INFEASIBLE), optimum),
     }
     assert not [name for name, (solution, least) in wrong.items() if honest(problem.form, solution, least)]

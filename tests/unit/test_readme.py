@@ -61,6 +61,15 @@ def test_the_bank_finds_the_faults_that_were_simulated(root: Path, capsys: pytes
     assert capsys.readouterr().out
 
 
+def test_isolability_names_what_cannot_be_told_apart(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code = _block((root / "README.md").read_text(encoding="utf-8"), "isolability")
+    exec(compile(code, "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "thruster" in printed
+    assert "gyro" in printed
+    assert "second gyro" in printed
+
+
 def test_the_two_commands_set_up_and_run(root: Path) -> None:
     readme = (root / "README.md").read_text(encoding="utf-8")
     assert _block(readme, "main-command").rstrip().endswith("optsat demo")

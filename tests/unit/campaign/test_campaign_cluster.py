@@ -123,7 +123,7 @@ def test_a_cluster_without_workers_and_one_that_is_lost(tmp_path: Path) -> None:
     finally:
         _stop(processes[1:] if scheduler.poll() is not None else processes)
     assert len(list(folder.glob("chunks/[0-9]*"))) >= 2
-    run_study(slow_study.study, cases=CASES, out=folder, resume=True)
+    run_study(slow_study.study, cases=CASES, out=folder, resume=True, workers=2)
     run_study(slow_study.study, cases=CASES, out=tmp_path / "serial")
     assert _bytes(folder) == _bytes(tmp_path / "serial")
 
